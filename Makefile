@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Each command makes the environment it needs. PYTHON=... names the interpreter; otherwise one is looked for.
+
+DEMO_FOLDER ?= build/demo
+PYTEST_ARGUMENTS ?=
+
+# Prints the environment's Python, and makes the environment first where it is missing or out of date.
+environment = interpreter=$$(.ci/find_python "$(PYTHON)") && python=$$("$$interpreter" .ci/environment.py)
+
+.PHONY: help demo test lint extension benchmark environment clean
+
+help:
+	@echo "make demo       render the demo scenes to $(DEMO_FOLDER)"
+	@echo "make test       run the tests"
+	@echo "make lint       style, types, and the rule that physics knows nothing of Blender"
+	@echo "make extension  build the extension for Blender into build/"
+	@echo "make benchmark  measure the tracer and the baking of a 1080p map"
+	@echo "PYTHON=/path/to/python chooses the interpreter: 3.11 runs Blender 4.5, 3.13 runs Blender 5.2"
+
+environment:
+	@$(environment) && echo "Ready: $$python"
+
+demo:
+	@$(environment) && PYTHONPATH=. "$$python" blend_files/render_demo.py "$(DEMO_FOLDER)" && \
+	  echo "The pictures are in $(abspath $(DEMO_FOLDER)):" && find "$(DEMO_FOLDER)" -name '*.png' | sort
+
+test:
+	@$(environment) && "$$python" -m pytest $(PYTEST_ARGUMENTS)
+
+lint:
+	@$(environment) && bin=$$(dirname "$$python") && "$$bin/ruff" check . && "$$bin/mypy" && "$$bin/lint-imports"
+
+extension:
+	@$(environment) && "$$python" .ci/build_extension.py && "$$python" .ci/build_extension.py --split-platforms
+
+benchmark:
+	@$(environment) && for script in benchmarks/bench_*.py; do PYTHONPATH=. "$$python" "$$script" || exit 1; done
+
+clean:
+	rm -rf build .pytest_cache .ruff_cache .mypy_cache .import_linter_cache
