@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the virtual environment `.venv-py311` or `.venv-py313`, for the Python that runs this file.
 
-Everything comes from pyproject.toml through pip. A stamp in the environment holds a digest of what was asked for,
-so that nothing is installed again until pyproject.toml asks for something else. Prints the environment's Python.
+Everything comes from pyproject.toml through pip. A stamp in the environment holds a digest of what was asked
+for, so that nothing is installed again until pyproject.toml asks for something else. Prints the environment's
+Python.
 
 Needs the standard library only, because nothing else exists yet when it runs.
 """
@@ -21,11 +22,21 @@ SUPPORTED = ((3, 11), (3, 13))
 MISSING_LIBRARIES_STATUS = 3
 
 # What the Blender module links to and a bare server lacks, by Debian's names.
-SYSTEM_PACKAGES = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libxext6 libgl1".split()
+SYSTEM_PACKAGES = (
+    "libx11-6",
+    "libxrender1",
+    "libxfixes3",
+    "libxi6",
+    "libxkbcommon0",
+    "libsm6",
+    "libice6",
+    "libxext6",
+    "libgl1",
+)
 
 
 def requirements() -> list[str]:
-    """Everything pyproject.toml asks for: to run, Blender's module, the bundled release, and the developers' tools."""
+    """What pyproject.toml asks for: to run, Blender's module, the bundled release, the developers' tools."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     groups = project["dependency-groups"]
     return [
@@ -62,15 +73,15 @@ def make(folder: Path) -> None:
     usable = works(python)
     if usable and stamp.exists() and stamp.read_text(encoding="utf-8").strip() == digest(wanted):
         return
-    print(f"Preparing {folder.name} (about 400 MB to download the first time) ...", file=sys.stderr, flush=True)
+    print(f"Preparing {folder.name} (first time: about 400 MB to download) ...", file=sys.stderr, flush=True)
     stamp.unlink(missing_ok=True)
     if not usable:
         venv.create(folder, clear=folder.exists(), with_pip=True)
     command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted]
     if subprocess.run(command, check=False, stdout=sys.stderr).returncode != 0:
         sys.exit(
-            f"pip could not install what pyproject.toml asks for into {folder.name} (its reason is above). Check the "
-            "network and the free disk space, and that Blender's module is published for this system, then try again."
+            f"pip could not install what pyproject.toml asks for into {folder.name} (its reason is above). Check "
+            "the network, the free disk space, and that Blender's module is published for this system."
         )
     stamp.write_text(digest(wanted) + "\n", encoding="utf-8")
 
@@ -84,8 +95,8 @@ def check_blender(folder: Path) -> None:
     reason = (result.stderr.strip().splitlines() or [f"exit status {result.returncode}"])[-1]
     if "shared object" in reason:
         print(
-            f"Blender's module cannot start because system libraries are missing ({reason}). On Debian or Ubuntu "
-            f"install these packages as root, then try again: apt-get install {' '.join(SYSTEM_PACKAGES)}",
+            f"Blender's module cannot start because system libraries are missing ({reason}). On Debian or "
+            f"Ubuntu install these as root, then try again: apt-get install {' '.join(SYSTEM_PACKAGES)}",
             file=sys.stderr,
         )
         sys.exit(MISSING_LIBRARIES_STATUS)
@@ -94,9 +105,9 @@ def check_blender(folder: Path) -> None:
 
 def main() -> None:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(description="Make the virtual environment that the Makefile's commands run in.")
+    parser = argparse.ArgumentParser(description="Make the environment that the Makefile's commands run in.")
     parser.add_argument(
-        "--system-packages", action="store_true", help="print the Debian packages Blender's module needs, do no more"
+        "--system-packages", action="store_true", help="only print the Debian packages Blender's module needs"
     )
     arguments = parser.parse_args()
     if arguments.system_packages:
