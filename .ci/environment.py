@@ -80,8 +80,8 @@ def make(folder: Path) -> None:
     command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted]
     if subprocess.run(command, check=False, stdout=sys.stderr).returncode != 0:
         sys.exit(
-            f"pip could not install what pyproject.toml asks for into {folder.name} (its reason is above). Check "
-            "the network, the free disk space, and that Blender's module is published for this system."
+            f"pip could not install what pyproject.toml asks for into {folder.name} (its reason is above). "
+            "Check the network, the free disk space, and that Blender's module is published for this system."
         )
     stamp.write_text(digest(wanted) + "\n", encoding="utf-8")
 
