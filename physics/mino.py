@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The null geodesics in Mino time: the regularised form of Eq. 2 that is traced by default.
+
+Multiplying Eq. 2 of Verbraeck & Eisemann by rho^2 (Mino 2003, Phys. Rev. D 67, 084027: d lambda = d zeta /
+rho^2) separates r from theta. With u = 1/r and n the unit vector of the angles (theta, phi_theta):
+
+* u'^2 = U(u) = 1 + (a^2 - q - b^2) u^2 + 2 ((a - b)^2 + q) u^3 - a^2 q u^4, or u'' = U'(u) / 2: infinity is
+  u = 0, reached at a finite lambda;
+* n'' = -|n'|^2 n + a^2 n_z (z - n_z n), |n'|^2 = q + b^2 + a^2 n_z^2: motion on a sphere, regular at its poles;
+* phi = phi_theta + psi, psi' = a (2 u - a b u^2) / (1 - 2 u + a^2 u^2).
+
+Why the radial equation is not integrated as u'' = U'(u) / 2: next to the critical curve its solutions part
+exponentially, and an integration error of size e throws rays within about e of the edge to the wrong
+side of the hole. Its first integral has no such freedom once the turning point u_t is taken out of it.
+With u = u_t (1 - x^2), x runs from the camera through the turning point at x = 0 to infinity at x = 1 and
+
+    x' = sqrt(G(x^2)) / 2,   G(s) = g_0 + g_1 s + g_2 s^2 + g_3 s^3 > 0,
+
+an equation in which an error is a shift in time and stays one: the smoothness of u'' = U'/2 without its
+instability. Rays that go straight out have u = u_0 (1 - x) instead, x' = sqrt(U) / u_0.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from abc import ABC, abstractmethod
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rays import Array, Rays
+from .trapped import Barrier
+
+Mask = NDArray[np.bool_]
+
+# Rows of the state: the radial coordinate x, the unit vector n, its derivative n', the extra rotation psi.
+X, N, N_PRIME, PSI = 0, slice(1, 4), slice(4, 7), 7
+N_COMPONENTS = 8
+
+# The first step, as an angle along the ray's path in radians; the controller takes over from there.
+FIRST_ANGLE = 0.3
+
+# Gauss-Legendre nodes and weights on [0, 1] for the time left to infinity. Where the step that error control
+# allows reaches infinity, the integrand is smooth enough for these to be far better than the step itself.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+
+NEWTON_ROUNDS = 16
+
+
+def radial_polynomial(rays: Rays) -> tuple[Array, Array, Array]:
+    """Return the coefficients c_2, c_3, c_4 of U(u) = 1 + c_2 u^2 + c_3 u^3 + c_4 u^4, each of shape (n,)."""
+    a = rays.spin
+    c2 = a * a - rays.carter
+    c3 = 2.0 * (rays.carter + a * a - 2.0 * a * rays.b)
+    c4 = -a * a * rays.q
+    return c2, c3, c4
+
+
+class MinoSystem(ABC):
+    """Rays from one camera towards the sky, as a `runge_kutta.System` in Mino time."""
+
+    def __init__(self, rays: Rays, tolerance: float, start: Array, unit: Array, rates: Array) -> None:
+        """`start`: x at the camera; `unit`: u where x = 0; `rates`: polynomial of (d x / d lambda)^2, low first."""
+        theta, phi = rays.observer.theta, rays.observer.phi
+        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
+        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
+        state = np.zeros((N_COMPONENTS, len(rays)))
+        state[X] = start
+        state[N] = np.array([sin_theta * cos_phi, sin_theta * sin_phi, cos_theta])[:, None]
+        # Light moves with p_theta along theta-hat and b / sin(theta) along phi-hat; the backward ray against it.
+        theta_hat = np.array([cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta])[:, None]
+        phi_hat = np.array([-sin_phi, cos_phi, 0.0])[:, None]
+        state[N_PRIME] = -(theta_hat * rays.polar + phi_hat * rays.azimuthal)
+        self.state = state
+        self._spin = rays.spin
+        # Rotation rate psi' = u (2 a - a^2 b u) / (1 - 2 u + a^2 u^2), for the backward ray with its sign turned.
+        self._constants = np.vstack([unit, rays.carter, -2.0 * rays.spin * np.ones(len(rays)),
+                                     rays.spin**2 * rays.b, 1.0 / (np.sqrt(rays.carter + rays.spin**2) + 1.0),
+                                     rates])
+        # A last step that ends short of infinity, or beyond, is corrected to first order; what that leaves is
+        # of the order of the square of the distance.
+        self._arrival = 0.1 * math.sqrt(tolerance)
+
+    @staticmethod
+    @abstractmethod
+    def argument(x: Array) -> Array:
+        """Return what the rate polynomial and u = u_unit (1 - argument) take, from x."""
+
+    @property
+    def _pace(self) -> Array:
+        return self._constants[4]
+
+    def _rate(self, argument: Array) -> Array:
+        rates = self._constants[5:]
+        total = rates[-1] * argument
+        for coefficient in rates[-2:0:-1]:
+            total += coefficient
+            total *= argument
+        total += rates[0]
+        return np.sqrt(np.maximum(total, 0.0))
+
+    def derivative(self, state: Array, out: Array) -> None:
+        """Write d state / d lambda along the backward ray to `out`; both (8, n)."""
+        unit, carter, drag, drag_b = self._constants[:4]
+        a2 = self._spin * self._spin
+        argument = self.argument(state[X])
+        out[X] = self._rate(argument)
+        n_z = state[3]
+        out[N] = state[N_PRIME]
+        # n'' = -(carter + 2 a^2 n_z^2) n + a^2 n_z z
+        bend = n_z * n_z
+        bend *= -2.0 * a2
+        bend -= carter
+        np.multiply(state[N], bend, out=out[N_PRIME])
+        out[6] += a2 * n_z
+        u = unit * (1.0 - argument)
+        below = u * a2
+        below -= 2.0
+        below *= u
+        below += 1.0
+        turn = drag_b * u
+        turn += drag
+        turn *= u
+        np.divide(turn, below, out=out[PSI])
+
+    def error(self, difference: Array, state: Array, slope: Array) -> Array:
+        """Return the error of direction, in radians, that `difference` amounts to; shape (n,).
+
+        An error of x is a delay; it counts by the angle the ray moves in that time. One of n' counts by
+        what it makes over the time of a radian.
+        """
+        size = np.abs(difference)
+        speed = 1.0 / self._pace + np.abs(slope[PSI])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            delay = size[X] * speed / slope[X]
+        total: Array = delay + size[N].max(axis=0) + size[N_PRIME].max(axis=0) * self._pace + size[PSI]
+        return total
+
+    def first_step(self) -> Array:
+        """Return a first step in Mino time, shape (n,)."""
+        return FIRST_ANGLE * self._pace
+
+    def time_left(self, x: Array) -> Array:
+        """Return the Mino time from x to infinity by quadrature, shape (n,): good when x is past any slow part."""
+        distance = 1.0 - x
+        total = np.zeros_like(x)
+        with np.errstate(divide="ignore"):
+            for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+                total += weight / self._rate(self.argument(x + node * distance))
+        return total * distance
+
+    def limit(self, state: Array, slope: Array, step: Array) -> Array:
+        """Return `step` cut so that it ends at infinity, shape (n,)."""
+        return np.minimum(step, np.maximum(self.time_left(state[X]), 0.0))
+
+    def ended(self, state: Array) -> Mask:
+        """Return which rays have come to infinity, shape (n,)."""
+        return 1.0 - state[X] <= self._arrival
+
+    def failed(self, state: Array) -> Mask:
+        """Return which rays cannot go on: none, these coordinates are regular everywhere; shape (n,)."""
+        return np.zeros(state.shape[1], dtype=bool)
+
+    def select(self, rays: Mask) -> Self:
+        """Return the system of these rays alone."""
+        chosen = copy.copy(self)
+        chosen._constants = self._constants[:, rays]
+        return chosen
+
+    def sky_direction(self, state: Array) -> Array:
+        """Return the unit vectors towards which the rays of `state` leave, shape (n, 3)."""
+        slope = np.empty_like(state)
+        self.derivative(state, slope)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            left = (1.0 - state[X]) / slope[X]
+        final = state + slope * left
+        n = final[N] / np.sqrt((final[N] ** 2).sum(axis=0))
+        cos_psi, sin_psi = np.cos(final[PSI]), np.sin(final[PSI])
+        return np.stack([n[0] * cos_psi - n[1] * sin_psi, n[0] * sin_psi + n[1] * cos_psi, n[2]], axis=-1)
+
+
+class TurningRays(MinoSystem):
+    """Rays with a turning point u_t between hole and camera: u = u_t (1 - x^2)."""
+
+    def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
+        turning, rates = _turning_point(rays, barrier)
+        u = 1.0 / rays.observer.r
+        apart = np.maximum(1.0 - u / turning, 0.0)  # x^2 at the camera, short of digits when small
+        slope = np.sqrt(rates[0] + apart * (rates[1] + apart * (rates[2] + apart * rates[3])))
+        # u'^2 = U gives x without that loss: u' = -2 u_t x x', and |u'| = u^2 |Delta p_r|.
+        start = -rays.radial * (u * u) / (turning * slope)
+        super().__init__(rays, tolerance, start, turning, 0.25 * rates)
+
+    @staticmethod
+    def argument(x: Array) -> Array:
+        """Return x^2."""
+        return x * x
+
+
+class DirectRays(MinoSystem):
+    """Rays that go from the camera straight out, with nothing to turn them: u = u_0 (1 - x)."""
+
+    def __init__(self, rays: Rays, tolerance: float) -> None:
+        u = 1.0 / rays.observer.r
+        c2, c3, c4 = radial_polynomial(rays)
+        # U(u_0 (1 - x)) / u_0^2 as a polynomial in x; U(u_0) = u_0^4 R(r_0) = (u_0^2 Delta p_r)^2.
+        rates = np.stack([
+            (u * rays.radial) ** 2,
+            -(2.0 * c2 + 3.0 * c3 * u + 4.0 * c4 * u * u),
+            c2 + 3.0 * c3 * u + 6.0 * c4 * u * u,
+            -(c3 * u + 4.0 * c4 * u * u),
+            c4 * u * u,
+        ])
+        count = len(rays)
+        super().__init__(rays, tolerance, np.zeros(count), np.full(count, u), rates)
+
+    @staticmethod
+    def argument(x: Array) -> Array:
+        """Return x."""
+        return x
+
+
+def _turning_point(rays: Rays, barrier: Barrier) -> tuple[Array, Array]:
+    """Return u_t, shape (n,), and the coefficients g_0 .. g_3 of G, shape (4, n).
+
+    The largest root of R lies h above its minimum r_m, with R(r_m) + R''/2 h^2 + 4 r_m h^3 + h^4 = 0. All
+    terms but the first are positive and convex, so each alone bounds h from above and Newton's method comes
+    down from the least bound without passing the root; written in h, it keeps its digits for the
+    nearly double roots next to the critical curve.
+    """
+    r_m, half, depth = barrier.radius, barrier.curvature, -barrier.height
+    with np.errstate(divide="ignore"):
+        h = np.minimum(np.sqrt(depth / half), np.minimum(np.cbrt(depth / (4.0 * r_m)), np.sqrt(np.sqrt(depth))))
+    h = np.minimum(h, np.maximum(rays.observer.r - r_m, np.finfo(float).tiny))
+    for _ in range(NEWTON_ROUNDS):
+        excess = h * h * (half + h * (4.0 * r_m + h)) - depth
+        slope = h * (2.0 * half + h * (12.0 * r_m + 4.0 * h))
+        change = excess / slope
+        h = np.maximum(h - change, 0.5 * h)
+        if np.all(np.abs(change) <= 4.0 * np.finfo(float).eps * h):
+            break
+    r_t = r_m + h
+    u_t = 1.0 / r_t
+    c2, c3, c4 = radial_polynomial(rays)
+    rates = np.stack([
+        h * (2.0 * half + h * (12.0 * r_m + 4.0 * h)) * u_t,  # R'(r_t) / r_t
+        c2 + u_t * (3.0 * c3 + 6.0 * c4 * u_t),
+        -u_t * (c3 + 4.0 * c4 * u_t),
+        c4 * u_t * u_t,
+    ])
+    return u_t, rates

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a direction in the camera's sky to a light ray: momenta, constants of motion, redshift.
+
+Equations 3 to 8 and 13 of Verbraeck & Eisemann, "Raytracing Equations" (after James et al. 2015), with Eq. 6
+corrected (its first line must end in B_r B_theta / kappa to be orthonormal) and with everything written so
+that it stays regular on the spin axis, where Eq. 8 is 0 times infinity.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .metric import MetricFunctions, axis_safe_sin, check_spin, metric_functions
+from .observer import Observer
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Light rays arriving at one camera; arrays of shape (n,).
+
+    The momenta are those of the *light* (Eq. 7), scaled to unit energy at infinity, p_t = -1: a ray traced
+    backwards runs along their negatives.
+    """
+
+    spin: float
+    observer: Observer
+    b: Array
+    """Constant of motion p_phi, units of M (Eq. 8)."""
+    carter: Array
+    """q + b^2 of Eq. 8 in units of M^2: unlike q it is regular on the axis."""
+    radial: Array
+    """Delta p_r (Eq. 7) in units of M^2: its square is R(r_cam) of Eq. 3; > 0 for outgoing light."""
+    polar: Array
+    """p_theta (Eq. 7), units of M."""
+    azimuthal: Array
+    """b / sin(theta_cam), units of M, regular on the axis."""
+    escapes: NDArray[np.bool_]
+    """Whether the energy at infinity is positive; the rest can come only from the horizon."""
+    one_plus_z: Array
+    """Eq. 13, f_source / f_camera for a source at rest at infinity; NaN where `escapes` is false."""
+
+    @property
+    def q(self) -> Array:
+        """Carter's constant q of Eq. 8, units of M^2."""
+        return self.carter - self.b * self.b
+
+    def __len__(self) -> int:
+        return len(self.b)
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Rays:
+        """Return the chosen rays alone."""
+        return Rays(
+            self.spin,
+            self.observer,
+            self.b[chosen],
+            self.carter[chosen],
+            self.radial[chosen],
+            self.polar[chosen],
+            self.azimuthal[chosen],
+            self.escapes[chosen],
+            self.one_plus_z[chosen],
+        )
+
+
+def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:
+    """Return the unit vectors N of Eq. 4, shape (n, 3), for viewing angles in radians, shape (n,) each."""
+    theta = np.asarray(theta_rd, dtype=np.float64)
+    phi = np.asarray(phi_rd, dtype=np.float64)
+    sin_theta = np.sin(theta)
+    return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def camera_triad(observer: Observer) -> Array:
+    """Return the camera's axes in the FIDO's triad: row i is e_x, e_y, e_z along (r, theta, phi)-hat.
+
+    The inverse of Eq. 6 corrected. Along B = +-theta-hat, where kappa = 0, e_x = r-hat and
+    e_z = e_x x e_y.
+    """
+    b_r, b_theta, b_phi = observer.direction
+    kappa = math.hypot(b_r, b_phi)
+    e_y = np.array([b_r, b_theta, b_phi])
+    e_x = np.array([1.0, 0.0, 0.0]) if kappa == 0.0 else np.array([b_phi, 0.0, -b_r]) / kappa
+    return np.stack([e_x, e_y, np.cross(e_x, e_y)])
+
+
+def rays_from_camera(spin: float, observer: Observer, directions: Array) -> Rays:
+    """Return the rays that a camera sees along `directions`.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    observer : Observer
+        The camera, outside the horizon.
+    directions : ndarray, shape (n, 3)
+        Unit vectors N in the camera frame (Eq. 4): where the camera looks. Light travels along -N.
+
+    Raises
+    ------
+    BlackHoleError
+        For a spin out of range or a camera inside the horizon.
+    """
+    spin = check_spin(spin)
+    metric = metric_functions(spin, observer.r, observer.theta)
+    doppler, light = _light_in_fido_frame(observer.beta, directions)
+    n_r, n_theta, n_phi = (light @ camera_triad(observer)).T
+    return _rays_from_fido(spin, observer, metric, (n_r, n_theta, n_phi), doppler)
+
+
+def rays_from_triad(spin: float, observer: Observer, looking: Array) -> Rays:
+    """Return the rays that a camera sees along `looking`, given on the axes (r-hat, theta-hat, phi-hat).
+
+    The same as `rays_from_camera` with N expressed not on (e_x, e_y, e_z) but on the FIDO's triad carried
+    along by the boost to the camera; shape (n, 3).
+    """
+    return rays_from_camera(spin, observer, looking @ camera_triad(observer).T)
+
+
+def _light_in_fido_frame(beta: float, directions: Array) -> tuple[Array, Array]:
+    """Return the Doppler factor of Eq. 13 and the light's direction of Eq. 5 on (e_x, e_y, e_z)."""
+    gamma_inverse = math.sqrt((1.0 - beta) * (1.0 + beta))
+    along = directions[:, 1]
+    ahead = 1.0 - beta * along
+    light = -gamma_inverse * directions
+    light[:, 1] = beta - along
+    light /= ahead[:, None]
+    return ahead / gamma_inverse, light
+
+
+def _rays_from_fido(
+    spin: float,
+    observer: Observer,
+    metric: MetricFunctions,
+    light: tuple[Array, Array, Array],
+    doppler: Array,
+) -> Rays:
+    n_r, n_theta, n_phi = light
+    # Energy at infinity for unit energy in the FIDO's frame, 1/E_f of Eq. 7; inside the ergosphere it can
+    # be zero or negative. It is also alpha / (1 - b omega), the second factor of Eq. 13.
+    energy = metric.alpha + metric.omega * metric.varpi * n_phi
+    escapes = energy > 0.0
+    fido_energy = 1.0 / np.where(escapes, energy, np.nan)
+    # varpi / sin(theta) = Sigma / rho is finite on the axis, where varpi and b vanish together (Eq. 8).
+    azimuthal = fido_energy * (metric.sigma / metric.rho) * n_phi
+    polar = fido_energy * metric.rho * n_theta
+    a_cos = spin * math.cos(observer.theta)
+    return Rays(
+        spin=spin,
+        observer=observer,
+        b=azimuthal * axis_safe_sin(observer.theta),
+        carter=polar * polar + azimuthal * azimuthal - a_cos * a_cos,
+        radial=fido_energy * metric.rho * math.sqrt(metric.delta) * n_r,
+        polar=polar,
+        azimuthal=azimuthal,
+        escapes=escapes,
+        one_plus_z=np.where(escapes, doppler * energy, np.nan),
+    )

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which rays come from the sky and which from the hole: trapped photon orbits and the shadow's edge.
+
+Equations 9 to 12 of Verbraeck & Eisemann, "Raytracing Equations" (after James et al. 2015, appendix A). Their
+flowchart compares b and q with the orbits at constant radius, found as roots of Eq. 9; that loses its
+digits for small spin and divides by zero at spin 0. The form used for tracing needs no root search:
+
+With A = (a^2 - b^2 - q) / 2 and C = ((b - a)^2 + q) / 2, the derivative of Eq. 3's R is
+R'(r) / 4 = r^3 + A r + C. Its largest root r_m, where there is one, is where R has its outermost minimum: a
+ray is turned back there exactly if R(r_m) < 0 with r_m outside the horizon. A camera outside such a barrier
+sees sky, one inside sees the hole; without a barrier the sign of p_r decides. The critical curve, the edge of
+the shadow, is R(r_m) = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import BlackHoleError
+from .metric import check_spin, horizon_radius
+from .rays import Array, Rays
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """The outermost minimum of R(r) for each ray, shape (n,), NaN where R has none outside the horizon."""
+
+    radius: Array
+    """r_m, units of M."""
+    height: Array
+    """R(r_m), units of M^4: negative where light is turned back."""
+    curvature: Array
+    """R''(r_m) / 2, units of M^2, >= 0."""
+
+    @property
+    def blocks(self) -> NDArray[np.bool_]:
+        """Whether the barrier turns rays back."""
+        return self.height < 0.0  # NaN: False
+
+
+def find_barrier(rays: Rays) -> Barrier:
+    """Return the outermost minimum of Eq. 3's R for each ray, in closed form."""
+    a = rays.spin
+    linear = 0.5 * (a * a - rays.carter)  # A
+    constant = 0.5 * (rays.carter + a * a - 2.0 * a * rays.b)  # C
+    with np.errstate(invalid="ignore", divide="ignore"):
+        exists = (linear < 0.0) & (4.0 * linear**3 + 27.0 * constant**2 <= 0.0)
+        third = np.sqrt(np.where(exists, -linear, np.nan) / 3.0)
+        cosine = np.clip(-0.5 * constant / third**3, -1.0, 1.0)
+        # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3)
+        radius = 2.0 * third * np.cos(np.arccos(cosine) / 3.0)
+        radius = np.where(radius > horizon_radius(a), radius, np.nan)
+        square = radius * radius
+        # R = r^4 + 2 A r^2 + 4 C r - a^2 q (Eq. 3 multiplied out)
+        height = square * (square + 2.0 * linear) + 4.0 * constant * radius - a * a * rays.q
+        curvature = np.maximum(6.0 * square + 2.0 * linear, 0.0)
+    return Barrier(radius, height, curvature)
+
+
+def comes_from_sky(rays: Rays, barrier: Barrier | None = None) -> NDArray[np.bool_]:
+    """Return which rays come from the sky (Eqs. 11, 12 in closed form), shape (n,).
+
+    Rays of no or negative energy at infinity, which occur inside the ergosphere, come from the horizon.
+    """
+    barrier = find_barrier(rays) if barrier is None else barrier
+    unobstructed = rays.radial < 0.0
+    outside = rays.observer.r > barrier.radius
+    return rays.escapes & np.where(barrier.blocks, outside, unobstructed)
+
+
+def edge_function(rays: Rays) -> Array:
+    """Return a smooth signed measure of how far inside the sky each ray lies, shape (n,).
+
+    Positive exactly for rays from the sky, negative for the shadow, zero on its edge, and smooth across it;
+    a difference of radial direction cosines, of order 1.
+
+    Expanding R about its minimum, (Delta p_r)^2 = R(r_cam) = R(r_m) + Y^2 with
+    Y = (r_cam - r_m) sqrt(R''/2 + 4 r_m h + h^2), h = r_cam - r_m. Hence R(r_m) = (X - Y)(X + Y) with
+    X = Delta p_r, and the cases of `comes_from_sky` become the single condition Y - X > 0.
+    """
+    barrier = find_barrier(rays)
+    offset = rays.observer.r - barrier.radius
+    with np.errstate(invalid="ignore"):
+        squared = barrier.curvature + offset * (4.0 * barrier.radius + offset)
+        reach = np.where(np.isnan(offset), 0.0, offset * np.sqrt(np.maximum(squared, 0.0)))
+        # P of Eq. 3 bounds |X|: divided by it, the function stays bounded however large b and q grow.
+        r, a = rays.observer.r, rays.spin
+        bound = r * r + a * a - a * rays.b
+        return np.where(rays.escapes, (reach - rays.radial) / bound, -1.0)
+
+
+def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
+    """Return the constants b0, q0 of the photon orbits at constant radius r_0 (Eq. 9).
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, not 0: there the orbits share one radius, 3, and have b^2 + q = 27.
+    radius : array_like
+        r_0 between the r_1 and r_2 of `trapped_radii`, units of M.
+
+    Returns
+    -------
+    b0, q0 : ndarray
+        Shape of `radius`; units of M and M^2.
+    """
+    a = check_spin(spin)
+    if a == 0.0:
+        raise BlackHoleError(
+            "Eq. 9 divides by the spin: without spin every trapped orbit has r = 3 and b^2 + q = 27."
+        )
+    r = np.asarray(radius, dtype=np.float64)
+    b0 = -(r**3 - 3.0 * r**2 + a * a * r + a * a) / (a * (r - 1.0))
+    q0 = -(r**3) * (r**3 - 6.0 * r**2 + 9.0 * r - 4.0 * a * a) / (a * a * (r - 1.0) ** 2)
+    return b0, q0
+
+
+def trapped_radii(spin: float) -> tuple[float, float]:
+    """Return r_1 and r_2, the radii of the prograde and retrograde circular photon orbits (Eq. 10)."""
+    a = check_spin(spin)
+    prograde = 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-a)))
+    retrograde = 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(a)))
+    return prograde, retrograde
+
+
+def trapped_impact_parameters(spin: float) -> tuple[float, float]:
+    """Return b_1 = b0(r_2) < b_2 = b0(r_1), the ends of the range of Eq. 11, in closed form.
+
+    b0(r_1) = -a + 6 cos(arccos(-a)/3), b0(r_2) = -a - 6 cos(arccos(a)/3): good at spin 0 as well, where
+    Eq. 9 is not. (BPT's radii of Eq. 10 put into Eq. 9 and simplified.)
+    """
+    a = check_spin(spin)
+    return -a - 6.0 * math.cos(math.acos(a) / 3.0), -a + 6.0 * math.cos(math.acos(-a) / 3.0)
+
+
+def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
+    """Return q0(b), Carter's constant of the trapped orbit with impact parameter b (Eqs. 9, 11).
+
+    b0(r_0) = b is the cubic x^3 + (a^2 + a b - 3) x + 2 (a^2 - 1) = 0 in x = r_0 - 1, whose largest root is
+    wanted; Carter's constant follows from R'(r_0) = 0 rather than from Eq. 9, so that a = 0 needs no case.
+
+    Parameters
+    ----------
+    spin : float
+    b : array_like
+        Impact parameters between the ends given by `trapped_impact_parameters`, units of M.
+
+    Returns
+    -------
+    ndarray
+        q0, shape of `b`, units of M^2.
+
+    Raises
+    ------
+    BlackHoleError
+        For an impact parameter outside that range, which has no trapped orbit.
+    """
+    a = check_spin(spin)
+    b = np.asarray(b, dtype=np.float64)
+    low, high = trapped_impact_parameters(a)
+    if np.any((b < low) | (b > high)):
+        raise BlackHoleError(f"Trapped orbits have impact parameters between {low:.6g} and {high:.6g} only.")
+    third = np.sqrt(np.maximum((3.0 - a * a - a * b) / 3.0, 0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.clip((1.0 - a * a) / third**3, -1.0, 1.0)
+    r = 1.0 + 2.0 * third * np.cos(np.arccos(np.where(third > 0.0, cosine, 1.0)) / 3.0)
+    # R = R' = 0 gives P(r) = 2 r Delta / (r - 1) and (b - a)^2 + q = P^2 / Delta = 4 r^2 Delta / (r - 1)^2.
+    delta = r * r - 2.0 * r + a * a
+    return 4.0 * r * r * delta / (r - 1.0) ** 2 - (b - a) ** 2
