@@ -26,11 +26,11 @@ PHYSICS = ROOT / "physics"
 BUILD = ROOT / "build"
 WHEEL_CACHE = BUILD / "wheels"
 
-# Blender 4.5 and 5.0 carry Python 3.11, 5.1 and 5.2 carry 3.13; Linux distributions build it with 3.14 as well.
+# Blender 4.5 and 5.0 carry Python 3.11, 5.1 and 5.2 carry 3.13; Linux distributions build it with 3.14 too.
 PYTHON_TAGS = ("cp311", "cp313", "cp314")
 
-# Blender's name of a platform: the platform tag asked of pip, and the pattern of the tags that a fetched wheel
-# may carry (a wheel for an older system serves as well).
+# Blender's name of a platform: the platform tag asked of pip, and the pattern of tags on what it fetches (a
+# wheel for an older system serves as well).
 WHEEL_TAGS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux*_x86_64"),
     "linux-arm64": ("manylinux_2_28_aarch64", "manylinux*_aarch64"),

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each test of the add-on starts from Blender's factory scene."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _factory_scene(factory_scene: None) -> None:
+    """Reset Blender for each test in this folder."""
