@@ -2,8 +2,9 @@
 """The null geodesics as printed: Eq. 2 of Verbraeck & Eisemann, with the affine parameter zeta.
 
 The source text's own method, kept as a check of the Mino-time form, with which it shares no equation of motion.
-It has that text's limits, stated rather than hidden: infinity is a large radius, and rays that pass close to the
-spin axis, where Eq. 2 contains 1/sin^3 theta, are given up.
+It has that text's limits, stated rather than hidden: infinity is a large radius; rays that pass close to the
+spin axis, where Eq. 2 contains 1/sin^3 theta, are given up, and so are those so close to the critical curve that
+its exponential parting of neighbours would amplify the integration's own error into a wrong direction.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from .metric import horizon_radius
 from .rays import Array, Rays
+from .trapped import edge_function
 
 Mask = NDArray[np.bool_]
 
@@ -33,6 +35,11 @@ POLE_LIMIT = 1e-3
 # far above what error control leaves on rays that are well resolved, far below what a missed pole does.
 DRIFT_LIMIT = 1e4
 
+# Closest approach to the shadow's edge, as `edge_function` in multiples of the tolerance, that is trusted: the
+# amplification there is of the order of 1 / distance, so that errors of direction stay below some 1e-3 radians.
+EDGE_LIMIT = 1e4
+
+# The first step in zeta, as a share of the camera's radius.
 FIRST_STEP = 0.02
 
 
@@ -56,6 +63,7 @@ class PrintedSystem:
         self._far = max(FAR_RADIUS, FAR_FACTOR * observer.r)
         self._horizon = horizon_radius(a)
         self._drift_limit = DRIFT_LIMIT * tolerance
+        self._critical = edge_function(rays) < EDGE_LIMIT * tolerance
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d zeta along the backward ray to `out`; both (5, n).
@@ -131,12 +139,13 @@ class PrintedSystem:
             null = (delta * p_r) ** 2 + delta * (p_theta * p_theta + w * w) - big_p * big_p
             carter = p_theta * p_theta + (self._b / sin) ** 2 - a * a * cos * cos - self._carter
             drift = np.abs(null) / (big_p * big_p) + np.abs(carter) / (self._scale * self._scale)
-        return near_axis | inside | ~(drift <= self._drift_limit)
+        return near_axis | inside | self._critical | ~(drift <= self._drift_limit)
 
     def select(self, rays: Mask) -> Self:
         """Return the system of these rays alone."""
         chosen = copy.copy(self)
         chosen._b, chosen._carter, chosen._scale = self._b[rays], self._carter[rays], self._scale[rays]
+        chosen._critical = self._critical[rays]
         return chosen
 
     def sky_direction(self, state: Array) -> Array:

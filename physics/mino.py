@@ -201,21 +201,31 @@ class TurningRays(MinoSystem):
 
 
 class DirectRays(MinoSystem):
-    """Rays that go from the camera straight out, with nothing to turn them: u = u_0 (1 - x)."""
+    """Rays that go from the camera straight out, with nothing to turn them: u = u_c (1 - x).
 
-    def __init__(self, rays: Rays, tolerance: float) -> None:
-        u = 1.0 / rays.observer.r
+    The centre u_c is the camera, or, for a camera inside a barrier that does not turn the ray, the top of the
+    barrier: next to the critical curve U almost vanishes there, and expanded about it keeps its digits.
+    """
+
+    def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
+        r = rays.observer.r
+        ahead = barrier.radius > r  # False where there is no barrier
+        unit = 1.0 / np.where(ahead, barrier.radius, r)
+        square = unit * unit
         c2, c3, c4 = radial_polynomial(rays)
-        # U(u_0 (1 - x)) / u_0^2 as a polynomial in x; U(u_0) = u_0^4 R(r_0) = (u_0^2 Delta p_r)^2.
+        # U(u_c (1 - x)) / u_c^2 as a polynomial in x. U = u^4 R, so that U' = 4 u^3 R where R' vanishes.
         rates = np.stack([
-            (u * rays.radial) ** 2,
-            -(2.0 * c2 + 3.0 * c3 * u + 4.0 * c4 * u * u),
-            c2 + 3.0 * c3 * u + 6.0 * c4 * u * u,
-            -(c3 * u + 4.0 * c4 * u * u),
-            c4 * u * u,
+            square * np.where(ahead, barrier.height, rays.radial**2),
+            np.where(
+                ahead,
+                -4.0 * square * barrier.height,
+                -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
+            ),
+            c2 + 3.0 * c3 * unit + 6.0 * c4 * square,
+            -unit * (c3 + 4.0 * c4 * unit),
+            c4 * square,
         ])
-        count = len(rays)
-        super().__init__(rays, tolerance, np.zeros(count), np.full(count, u), rates)
+        super().__init__(rays, tolerance, 1.0 - 1.0 / (r * unit), unit, rates)
 
     @staticmethod
     def argument(x: Array) -> Array:

@@ -41,6 +41,10 @@ class Barrier:
         """Whether the barrier turns rays back."""
         return self.height < 0.0  # NaN: False
 
+    def select(self, chosen: NDArray[np.intp]) -> Barrier:
+        """Return the barriers of the chosen rays alone."""
+        return Barrier(self.radius[chosen], self.height[chosen], self.curvature[chosen])
+
 
 def find_barrier(rays: Rays) -> Barrier:
     """Return the outermost minimum of Eq. 3's R for each ray, in closed form."""

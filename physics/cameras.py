@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's cameras: from a pixel of the picture to a direction in the camera's own axes.
+
+The axes are Blender's: x to the right, y up, looking along -z. Pixel coordinates count from the picture's top
+left corner; the centre of pixel (column i, row j) is (i + 0.5, j + 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import BlackHoleError
+from .rays import Array
+
+# Pictures beyond this are a mistake; refusing them beats running out of memory.
+LARGEST_SIDE = 65536
+
+SENSOR_FITS = ("AUTO", "HORIZONTAL", "VERTICAL")
+
+
+def _check_size(width: int, height: int) -> None:
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+        raise BlackHoleError(
+            f"The picture's size is {width} x {height}; each side must be between 1 and {LARGEST_SIDE} pixels."
+        )
+
+
+@dataclass(frozen=True)
+class PerspectiveCamera:
+    """Blender's perspective camera.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the picture in pixels.
+    focal_length, sensor_width, sensor_height : float
+        In millimetres, > 0.
+    sensor_fit : {"AUTO", "HORIZONTAL", "VERTICAL"}
+        Which side of the picture the sensor fits; AUTO takes the longer one, and the sensor's width for both.
+    shift_x, shift_y : float
+        Lens shift in units of the fitted side.
+    pixel_aspect_x, pixel_aspect_y : float
+        Width and height of a pixel, > 0.
+
+    Raises
+    ------
+    BlackHoleError
+        For a value outside these ranges.
+    """
+
+    width: int
+    height: int
+    focal_length: float
+    sensor_width: float = 36.0
+    sensor_height: float = 24.0
+    sensor_fit: str = "AUTO"
+    shift_x: float = 0.0
+    shift_y: float = 0.0
+    pixel_aspect_x: float = 1.0
+    pixel_aspect_y: float = 1.0
+
+    kind = "perspective"
+
+    def __post_init__(self) -> None:
+        _check_size(self.width, self.height)
+        lengths = (
+            self.focal_length,
+            self.sensor_width,
+            self.sensor_height,
+            self.pixel_aspect_x,
+            self.pixel_aspect_y,
+        )
+        if not all(math.isfinite(length) and length > 0.0 for length in lengths):
+            raise BlackHoleError("The camera's focal length, sensor and pixel aspect must be positive numbers.")
+        if not (math.isfinite(self.shift_x) and math.isfinite(self.shift_y)):
+            raise BlackHoleError("The camera's lens shift must be a finite number.")
+        if self.sensor_fit not in SENSOR_FITS:
+            raise BlackHoleError(f"The sensor fit is '{self.sensor_fit}'; choose one of {', '.join(SENSOR_FITS)}.")
+
+    @classmethod
+    def from_field_of_view(cls, width: int, height: int, vertical: float) -> PerspectiveCamera:
+        """Return the camera with square pixels whose picture is `vertical` radians high, 0 < vertical < pi."""
+        if not 0.0 < vertical < math.pi:
+            raise BlackHoleError(
+                f"The field of view is {math.degrees(vertical):g} degrees; it must be between 0 and 180 degrees."
+            )
+        sensor = 24.0
+        return cls(
+            width,
+            height,
+            focal_length=0.5 * sensor / math.tan(0.5 * vertical),
+            sensor_height=sensor,
+            sensor_fit="VERTICAL",
+        )
+
+    def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
+        x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        per_pixel, fitted, tall = self._scale()
+        right = (x - 0.5 * self.width + self.shift_x * fitted) * per_pixel
+        up = ((0.5 * self.height - y) * tall + self.shift_y * fitted) * per_pixel
+        vectors = np.stack([right, up, np.full_like(right, -1.0)], axis=-1)
+        vectors /= np.sqrt(right * right + up * up + 1.0)[..., None]
+        return vectors
+
+    def pixel(self, direction: Array) -> tuple[float, float] | None:
+        """Return the pixel coordinates where a direction, shape (3,), is seen; None behind the camera."""
+        if not direction[2] < 0.0:
+            return None
+        per_pixel, fitted, tall = self._scale()
+        right, up = -direction[0] / direction[2], -direction[1] / direction[2]
+        x = right / per_pixel + 0.5 * self.width - self.shift_x * fitted
+        y = 0.5 * self.height - (up / per_pixel - self.shift_y * fitted) / tall
+        return float(x), float(y)
+
+    def _scale(self) -> tuple[float, float, float]:
+        """Return the tangent per pixel width, the fitted side in pixel widths, and a pixel's height in widths."""
+        tall = self.pixel_aspect_y / self.pixel_aspect_x
+        wider = self.pixel_aspect_x * self.width >= self.pixel_aspect_y * self.height
+        horizontal = self.sensor_fit == "HORIZONTAL" or (self.sensor_fit == "AUTO" and wider)
+        sensor = self.sensor_height if self.sensor_fit == "VERTICAL" else self.sensor_width
+        fitted = self.width if horizontal else self.height * tall
+        return sensor / (self.focal_length * fitted), fitted, tall
+
+
+@dataclass(frozen=True)
+class PanoramaCamera:
+    """Cycles' equirectangular panorama camera.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the picture in pixels.
+    latitude_min, latitude_max : float
+        Range from the picture's bottom to its top, radians within [-pi/2, pi/2].
+    longitude_min, longitude_max : float
+        Range from the picture's left to its right, radians within [-pi, pi]; 0 is straight ahead.
+
+    Raises
+    ------
+    BlackHoleError
+        For a value outside these ranges.
+    """
+
+    width: int
+    height: int
+    latitude_min: float = -math.pi / 2
+    latitude_max: float = math.pi / 2
+    longitude_min: float = -math.pi
+    longitude_max: float = math.pi
+
+    kind = "panorama"
+
+    def __post_init__(self) -> None:
+        _check_size(self.width, self.height)
+        for name, low, high, limit in (
+            ("latitude", self.latitude_min, self.latitude_max, math.pi / 2),
+            ("longitude", self.longitude_min, self.longitude_max, math.pi),
+        ):
+            # Blender keeps these as single-precision numbers, which may lie just beyond the float64 limit.
+            if not -limit * (1 + 1e-6) <= low < high <= limit * (1 + 1e-6):
+                raise BlackHoleError(
+                    f"The panorama's {name} runs from {math.degrees(low):g} to {math.degrees(high):g} degrees; "
+                    f"it must rise within -{math.degrees(limit):g} and {math.degrees(limit):g} degrees."
+                )
+
+    def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
+        x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        longitude = self.longitude_min + (self.longitude_max - self.longitude_min) * x / self.width
+        latitude = self.latitude_max - (self.latitude_max - self.latitude_min) * y / self.height
+        level = np.cos(latitude)
+        return np.stack([level * np.sin(longitude), np.sin(latitude), -level * np.cos(longitude)], axis=-1)
+
+    def pixel(self, direction: Array) -> tuple[float, float] | None:
+        """Return the pixel coordinates where a direction, shape (3,), is seen; None outside the picture's range."""
+        longitude = math.atan2(direction[0], -direction[2])
+        latitude = math.atan2(direction[1], math.hypot(direction[0], direction[2]))
+        if not (
+            self.longitude_min <= longitude <= self.longitude_max
+            and self.latitude_min <= latitude <= self.latitude_max
+        ):
+            return None
+        x = (longitude - self.longitude_min) / (self.longitude_max - self.longitude_min) * self.width
+        y = (self.latitude_max - latitude) / (self.latitude_max - self.latitude_min) * self.height
+        return x, y
+
+
+Camera = PerspectiveCamera | PanoramaCamera

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and writing OpenEXR files; the one module that knows the OpenEXR package."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from .errors import ImageFileError
+
+PathLike = str | os.PathLike[str]
+
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+
+# Header attributes that describe how a file is stored rather than what it is about.
+STRUCTURAL_ATTRIBUTES = frozenset(
+    "channels compression dataWindow displayWindow lineOrder pixelAspectRatio screenWindowCenter screenWindowWidth "
+    "type name version chunkCount tiles".split()
+)
+
+
+@contextlib.contextmanager
+def replacing(path: PathLike) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place when the block ends without an error.
+
+    A reader, or a crash, meets the old file or the new one whole, never a half.
+
+    Raises
+    ------
+    ImageFileError
+        When the folder cannot be made or written, or the disk is full.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
+        os.close(handle)
+    except OSError as error:
+        raise ImageFileError(f"Cannot write {target}: {_reason(error)}; choose another folder.") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp makes files that only their owner can read; a map is as public as its folder allows.
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise ImageFileError(
+            f"Cannot write {target}: {_reason(error)}; free some space or choose another folder."
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str] | None = None) -> None:
+    """Write an image as a scanline EXR with lossless ZIP compression, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be.
+    pixels : ndarray of float16 or float32, shape (height, width, 3 or 4)
+        R, G, B(, A), row 0 at the top.
+    attributes : mapping, optional
+        Strings for the header.
+
+    Raises
+    ------
+    ImageFileError
+        When the file cannot be written.
+    """
+    names = "RGBA"[: pixels.shape[2]]
+    channels = {name: np.ascontiguousarray(pixels[:, :, i]) for i, name in enumerate(names)}
+    header = {
+        **(attributes or {}),
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+    }
+    expected = None
+    with replacing(path) as temporary:
+        try:
+            with OpenEXR.File(header, channels) as file:
+                file.write(str(temporary))
+            expected = temporary.stat().st_size
+        except RuntimeError as error:
+            raise OSError(f"the EXR writer failed ({error})") from error
+        if not expected:
+            raise OSError("no space left on the device")
+
+
+def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Read an EXR file's R, G, B(, A) as float32, shape (height, width, 3 or 4), row 0 at the top, and its header.
+
+    Luminance-only files are read as grey.
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing, damaged or holds no picture.
+    """
+    with _opened(path, header_only=False) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+        header = _attributes(file)
+    if "Y" in channels and "R" not in channels:
+        channels = {name: channels["Y"] for name in "RGB"} | {k: v for k, v in channels.items() if k == "A"}
+    names = [name for name in "RGBA" if name in channels]
+    if names[:3] != ["R", "G", "B"]:
+        raise ImageFileError(f"{path} has no channels R, G and B; it is not a picture that can be used here.")
+    return np.stack([np.asarray(channels[name], dtype=np.float32) for name in names], axis=-1), header
+
+
+def read_exr_header(path: PathLike) -> dict[str, Any]:
+    """Read an EXR file's header alone: attributes by name, with ``size`` as (width, height).
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing or its header is damaged.
+    """
+    with _opened(path, header_only=True) as file:
+        return _attributes(file)
+
+
+@contextlib.contextmanager
+def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
+    try:
+        data = Path(path).read_bytes() if not header_only else None
+        with open(path, "rb") as stream:
+            magic = stream.read(4)
+    except FileNotFoundError as error:
+        raise ImageFileError(f"{path} does not exist.") from error
+    except OSError as error:
+        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.") from error
+    if magic != EXR_MAGIC:
+        raise ImageFileError(f"{path} is not an OpenEXR file.")
+    try:
+        source: Any = str(path) if data is None else io.BytesIO(data)
+        with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:
+            yield file
+    except (RuntimeError, ValueError, TypeError, MemoryError, UnicodeDecodeError) as error:
+        if isinstance(error, ImageFileError):
+            raise
+        raise ImageFileError(f"{path} is damaged or cut short: {str(error).strip() or type(error).__name__}.") from error
+
+
+def _attributes(file: OpenEXR.File) -> dict[str, Any]:
+    header = file.header()
+    (left, top), (right, bottom) = (tuple(int(value) for value in corner) for corner in header["dataWindow"])
+    kept = {name: value for name, value in header.items() if name not in STRUCTURAL_ATTRIBUTES}
+    return {**kept, "size": (right - left + 1, bottom - top + 1)}
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything one warp map depends on: the hole, the camera, and how they stand in the scene."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import warnings
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .errors import BlackHoleError
+from .metric import check_spin, metric_functions
+from .observer import Observer
+from .rays import Array
+from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, check_settings
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+MOTIONS = ("fido", "static", "circular", "circular_retrograde", "free_fall", "velocity")
+SUPERSAMPLING = (1, 2, 4)
+
+# Rotations that come from single-precision matrices are orthonormal to about this.
+ROTATION_TOLERANCE = 1e-4
+
+# Raised whenever the same parameters would give other pixels, so that maps baked before count as stale.
+BAKE_VERSION = 1
+
+
+@dataclass(frozen=True)
+class WarpMapParameters:
+    """What a warp map is made from.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    camera : PerspectiveCamera or PanoramaCamera
+        Its width and height are the picture's, before supersampling.
+    camera_position : tuple of float, shape (3,)
+        Cartesian, in the hole's frame (z along the spin axis), units of M. Its spherical coordinates are
+        taken as Boyer-Lindquist ones.
+    camera_to_hole, hole_to_world : nested tuple of float, shape (3, 3)
+        Rotations: camera axes to the hole's frame, and the hole's frame to the scene's world axes.
+    motion : str
+        One of `MOTIONS`: the observer's. "circular" is abreast of the circular orbit of the same radius.
+    velocity : tuple of float, shape (3,)
+        For motion "velocity": as the local FIDO measures it, Cartesian in the hole's frame, units of c.
+    supersampling : {1, 2, 4}
+        Map pixels along each side of a picture's pixel.
+    tolerance, method
+        As for `trace_rays`.
+    """
+
+    spin: float
+    camera: Camera
+    camera_position: Vector
+    camera_to_hole: Matrix = IDENTITY
+    hole_to_world: Matrix = IDENTITY
+    motion: str = "fido"
+    velocity: Vector = (0.0, 0.0, 0.0)
+    supersampling: int = 1
+    tolerance: float = DEFAULT_TOLERANCE
+    method: str = DEFAULT_METHOD
+
+    def __post_init__(self) -> None:
+        for name in ("camera_position", "velocity"):
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        for name in ("camera_to_hole", "hole_to_world"):
+            rows = tuple(tuple(float(value) for value in row) for row in getattr(self, name))
+            object.__setattr__(self, name, rows)
+
+    def validate(self) -> None:
+        """Raise BlackHoleError, with a sentence for the user, when no map can be made from these parameters."""
+        check_spin(self.spin)
+        check_settings(self.tolerance, self.method)
+        if self.supersampling not in SUPERSAMPLING:
+            raise BlackHoleError(f"The supersampling is {self.supersampling}; choose 1, 2 or 4.")
+        if not all(math.isfinite(value) for value in (*self.camera_position, *self.velocity)):
+            raise BlackHoleError("The camera's place and velocity must be finite numbers.")
+        for name in ("camera_to_hole", "hole_to_world"):
+            matrix = np.array(getattr(self, name))
+            proper = matrix.shape == (3, 3) and np.linalg.det(matrix) > 0.0
+            if not proper or np.abs(matrix @ matrix.T - np.eye(3)).max() > ROTATION_TOLERANCE:
+                raise BlackHoleError(f"The matrix {name} is not a rotation.")
+        metric_functions(self.spin, self.radius, 0.5)  # inside the horizon is the first thing to say
+        self.observer()
+
+    @property
+    def radius(self) -> float:
+        """Distance of the camera from the hole, units of M."""
+        return math.hypot(*self.camera_position)
+
+    @property
+    def map_size(self) -> tuple[int, int]:
+        """Width and height of the map in pixels."""
+        return self.camera.width * self.supersampling, self.camera.height * self.supersampling
+
+    def observer(self) -> Observer:
+        """Return the observer that the camera is."""
+        x, y, z = self.camera_position
+        r, theta, phi = self.radius, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
+        match self.motion:
+            case "fido":
+                return Observer.fido(r, theta, phi)
+            case "static":
+                return Observer.static(self.spin, r, theta, phi)
+            case "circular" | "circular_retrograde":
+                return Observer.keplerian(self.spin, r, theta, phi, prograde=self.motion == "circular")
+            case "free_fall":
+                return Observer.free_fall(self.spin, r, theta, phi)
+            case "velocity":
+                return self._moving_observer(r, theta, phi)
+        raise BlackHoleError(f"There is no motion '{self.motion}'; choose one of {', '.join(MOTIONS)}.")
+
+    def _moving_observer(self, r: float, theta: float, phi: float) -> Observer:
+        local = spherical_triad(theta, phi) @ np.array(self.velocity)
+        speed = float(np.linalg.norm(local))
+        if not speed < 1.0:
+            raise BlackHoleError(
+                f"The camera moves at {speed:.3g} times the speed of light; slow it down or raise the speed of light."
+            )
+        if speed == 0.0:
+            return Observer.fido(r, theta, phi)
+        b_r, b_theta, b_phi = (local / speed).tolist()
+        return Observer(r, theta, phi, speed, (b_r, b_theta, b_phi))
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256, in hexadecimal, of all parameters and of the version of what is made from them."""
+        text = json.dumps({"bake_version": BAKE_VERSION, **self.to_metadata()}, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def to_metadata(self) -> dict[str, Any]:
+        """Return every parameter as plain JSON values."""
+        values = asdict(self)
+        values["camera"] = {"kind": self.camera.kind, **asdict(self.camera)}
+        plain: dict[str, Any] = json.loads(json.dumps(values))
+        return plain
+
+    @classmethod
+    def from_metadata(cls, values: dict[str, Any]) -> WarpMapParameters:
+        """Return the parameters that `to_metadata` was made from."""
+        camera = dict(values["camera"])
+        kind = {"perspective": PerspectiveCamera, "panorama": PanoramaCamera}[camera.pop("kind")]
+        return cls(**{**values, "camera": kind(**camera)})
+
+
+def spherical_triad(theta: float, phi: float) -> Array:
+    """Return r-hat, theta-hat and phi-hat at a place as rows of Cartesian components, shape (3, 3)."""
+    sin_theta, cos_theta = math.sin(theta), math.cos(theta)
+    sin_phi, cos_phi = math.sin(phi), math.cos(phi)
+    return np.array([
+        [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta],
+        [cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta],
+        [-sin_phi, cos_phi, 0.0],
+    ])
+
+
+def looking_at_hole(position: Vector) -> Matrix:
+    """Return the rotation `camera_to_hole` of a camera at `position` that looks at the hole, the axis upright.
+
+    On the axis itself, where upright has no meaning, the picture's up is the direction of phi = 0 (x).
+    """
+    back = np.array(position) / np.linalg.norm(position)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if np.linalg.norm(right) < 1e-12:
+        right = np.cross([1.0, 0.0, 0.0], back)
+    right /= np.linalg.norm(right)
+    rows = np.stack([right, np.cross(back, right), back], axis=1).tolist()
+    return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
+
+
+def unstable_orbit_warning(parameters: WarpMapParameters) -> str | None:
+    """Return a sentence when the camera's circular orbit is inside the ISCO, else None."""
+    if parameters.motion not in ("circular", "circular_retrograde"):
+        return None
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Observer.circular_orbit(parameters.spin, parameters.radius, prograde=parameters.motion == "circular")
+    return str(caught[0].message) if caught else None

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The warp map's file format: float32 RGBA OpenEXR with a header that says all about it. See docs in README."""
+
+from __future__ import annotations
+
+import json
+import math
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ImageFileError, WarpMapError
+from .exr import PathLike, read_exr, read_exr_header, write_exr
+from .warp_map import WarpMap
+
+FORMAT = "umbra warp map"
+FORMAT_VERSION = 1
+
+# Header attributes, all strings.
+ATTRIBUTE_FORMAT = "umbraFormat"
+ATTRIBUTE_HASH = "umbraHash"
+ATTRIBUTE_COUNTS = "umbraCounts"
+ATTRIBUTE_PARAMETERS = "umbraParameters"
+ATTRIBUTE_CHECKSUM = "umbraChecksum"
+
+
+def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
+    """Write a warp map to an EXR file, whole or not at all.
+
+    Raises
+    ------
+    ImageFileError
+        When the file cannot be written.
+    """
+    pixels = np.stack([warp_map.theta, warp_map.phi, warp_map.one_plus_z, warp_map.visibility], axis=-1)
+    write_exr(
+        path,
+        pixels,
+        {
+            ATTRIBUTE_FORMAT: f"{FORMAT} {FORMAT_VERSION}",
+            ATTRIBUTE_HASH: warp_map.metadata["hash"],
+            ATTRIBUTE_COUNTS: json.dumps(warp_map.metadata["counts"]),
+            ATTRIBUTE_PARAMETERS: json.dumps(warp_map.metadata["parameters"]),
+            ATTRIBUTE_CHECKSUM: _checksum(pixels),
+            "comments": "R, G: theta, phi of the light's origin in world axes (radians); B: 1 + z; A: sky visibility",
+        },
+    )
+
+
+def read_warp_map(path: PathLike) -> WarpMap:
+    """Read a warp map.
+
+    Raises
+    ------
+    WarpMapError
+        When the file is missing, damaged, cut short, or not a warp map; the message names it and says which.
+    """
+    try:
+        pixels, header = read_exr(path)
+    except ImageFileError as error:
+        raise WarpMapError(_advice(str(error))) from error
+    metadata = _metadata(path, header)
+    if pixels.shape[2] != 4 or _checksum(pixels) != header.get(ATTRIBUTE_CHECKSUM):
+        raise WarpMapError(_advice(f"{path} is damaged: its pixels are not those that were written."))
+    theta, phi, one_plus_z, visibility = (np.ascontiguousarray(pixels[:, :, i]) for i in range(4))
+    _check_ranges(path, theta, phi, one_plus_z, visibility)
+    return WarpMap(theta, phi, one_plus_z, visibility, metadata)
+
+
+def read_warp_map_metadata(path: PathLike) -> dict[str, Any]:
+    """Read a warp map's metadata from its header alone, without its pixels.
+
+    Raises
+    ------
+    WarpMapError
+        When the file is missing, its header is damaged, or it is not a warp map.
+    """
+    try:
+        header = read_exr_header(path)
+    except ImageFileError as error:
+        raise WarpMapError(_advice(str(error))) from error
+    return _metadata(path, header)
+
+
+def _metadata(path: PathLike, header: Mapping[str, Any]) -> dict[str, Any]:
+    stamp = header.get(ATTRIBUTE_FORMAT)
+    if not isinstance(stamp, str) or not stamp.startswith(FORMAT + " "):
+        raise WarpMapError(_advice(f"{Path(path)} is not a warp map."))
+    if stamp != f"{FORMAT} {FORMAT_VERSION}":
+        raise WarpMapError(_advice(f"{Path(path)} is a warp map of another version ({stamp})."))
+    try:
+        parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
+        counts = json.loads(header[ATTRIBUTE_COUNTS])
+        expected = [
+            parameters["camera"][side] * parameters["supersampling"] for side in ("width", "height")
+        ]
+        metadata = {"format": stamp, "hash": str(header[ATTRIBUTE_HASH]), "counts": counts, "parameters": parameters}
+    except (KeyError, TypeError, ValueError) as error:
+        raise WarpMapError(_advice(f"{Path(path)} is damaged: its header cannot be read.")) from error
+    if list(header["size"]) != expected:
+        raise WarpMapError(_advice(f"{Path(path)} is damaged: its size is not that of its parameters."))
+    return metadata
+
+
+def _check_ranges(path: PathLike, *planes: NDArray[np.float32]) -> None:
+    theta, phi, one_plus_z, visibility = planes
+    fits = (
+        np.isfinite(one_plus_z).all()
+        and (one_plus_z != 0.0).all()
+        and ((theta >= 0.0) & (theta <= np.float32(math.pi))).all()
+        and ((phi >= 0.0) & (phi < np.float32(2.0 * math.pi))).all()
+        and ((visibility >= 0.0) & (visibility <= 1.0)).all()
+    )
+    if not fits:
+        raise WarpMapError(_advice(f"{Path(path)} is damaged: it holds values that no warp map has."))
+
+
+def _checksum(pixels: NDArray[np.float32]) -> str:
+    data = np.ascontiguousarray(pixels, dtype="<f4")
+    return f"crc32 {zlib.crc32(data.reshape(-1).view(np.uint8)):08x}"
+
+
+def _advice(sentence: str) -> str:
+    return f"{sentence.removesuffix('.')}; bake it again."
