@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The installed extension, for the tests that need Blender; the others must not import bpy, and start at once."""
+"""The installed extension, for the tests that need Blender; the others start without importing bpy."""
 
 import atexit
 import importlib

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panorama of the real stars against published positions, magnitudes and colours."""
+
+import math
+
+import numpy as np
+import pytest
+
+from physics import BlackHoleError
+from physics.milky_way import galactic_axes, unresolved_glow
+from physics.star_colour import LUMINANCE_WEIGHTS, black_body_colour, temperature_from_colour_index
+from physics.star_sky import (
+    ZERO_MAGNITUDE,
+    Stars,
+    draw_stars,
+    load_stars,
+    row_solid_angles,
+    star_sky,
+    texel_directions,
+)
+
+HEIGHT = 1024
+
+# Right ascension and declination (degrees, J2000) and V: SIMBAD.
+KNOWN = {
+    "Sirius": (101.287155, -16.716116, -1.46),
+    "Betelgeuse": (88.792939, 7.407064, 0.42),
+    "Polaris": (37.954561, 89.264109, 2.02),
+    "Achernar": (24.428523, -57.236753, 0.46),  # one of the southern sky
+    "Alpheratz": (2.096916, 29.090431, 2.06),  # close to right ascension 0, the middle of the panorama
+}
+
+# One magnitude 10 star per square degree, in magnitude 0 stars per steradian.
+S10 = 1e-4 / math.radians(1.0) ** 2
+
+
+def one_star(ra_degrees: float, dec_degrees: float, b_v: float = 0.45) -> Stars:
+    ra, dec = np.radians([[ra_degrees], [dec_degrees]])
+    return Stars(ra, dec, np.array([0.0]), np.array([b_v]))
+
+
+def direction(ra_degrees: float, dec_degrees: float) -> np.ndarray:
+    ra, dec = np.radians([ra_degrees, dec_degrees])
+    return np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+
+
+def light(picture: np.ndarray) -> np.ndarray:
+    """Light of each texel: luminance times solid angle."""
+    return picture.astype(np.float64) @ LUMINANCE_WEIGHTS * row_solid_angles(len(picture))[:, np.newaxis]
+
+
+@pytest.fixture(scope="module")
+def stars_only() -> np.ndarray:
+    return star_sky(HEIGHT, galactic_glow=False)
+
+
+@pytest.fixture(scope="module")
+def directions() -> np.ndarray:
+    return texel_directions(np.arange(HEIGHT), HEIGHT)
+
+
+@pytest.mark.parametrize("height", [16, 100, 512])
+def test_all_the_light_of_the_catalogue_is_there(height: int) -> None:
+    expected = np.sum(10.0 ** (-0.4 * load_stars().magnitude)) * ZERO_MAGNITUDE
+    picture = star_sky(height, galactic_glow=False)
+    assert picture.shape == (height, 2 * height, 3)
+    assert picture.dtype == np.float32
+    assert light(picture).sum() == pytest.approx(expected, rel=1e-6)
+
+
+def test_magnitude_limit_leaves_out_the_faint_stars() -> None:
+    assert len(load_stars().magnitude) == 41411
+    bright = load_stars(2.0)
+    assert bright.magnitude.max() <= 2.0
+    expected = bright.flux.sum() * ZERO_MAGNITUDE
+    assert light(star_sky(64, magnitude_limit=2.0, galactic_glow=False)).sum() == pytest.approx(
+        expected, rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_stars_are_where_they_belong(name: str, stars_only: np.ndarray, directions: np.ndarray) -> None:
+    ra, dec, magnitude = KNOWN[name]
+    star = direction(ra, dec)
+    near = directions @ star > math.cos(4.0 * math.pi / HEIGHT)
+    share = light(stars_only)[near]
+    assert share.sum() == pytest.approx(10.0 ** (-0.4 * magnitude) * ZERO_MAGNITUDE, rel=0.1)
+    centroid = share @ directions[near]
+    off = math.acos(min(1.0, centroid @ star / np.linalg.norm(centroid)))
+    assert off < 0.2 * math.pi / HEIGHT
+    # Blender's own mapping of that direction to the picture, in texels from the left and the top.
+    u, v = 0.5 - math.atan2(star[1], star[0]) / (2 * math.pi), 0.5 + math.asin(star[2]) / math.pi
+    row, column = int((1.0 - v) * HEIGHT), int(u * 2 * HEIGHT)
+    brightest = np.where(near, stars_only @ LUMINANCE_WEIGHTS, 0.0)
+    found_row, found_column = np.unravel_index(np.argmax(brightest), brightest.shape)
+    assert abs(found_row - row) <= 1
+    assert abs(found_column - column) * math.cos(math.radians(dec)) <= 1
+
+
+@pytest.mark.parametrize(
+    ("ra", "dec"),
+    [(0, 0), (180, 10), (77, -45.3), (200, 85), (300, -89.5), (10, 89.97), (123, 90), (0, -90)],
+)
+def test_a_star_is_round_and_keeps_its_light_everywhere(
+    ra: float, dec: float, directions: np.ndarray
+) -> None:
+    picture = draw_stars(one_star(ra, dec), HEIGHT, star_width=2.0)
+    share = light(picture)
+    assert share.sum() == pytest.approx(1.0, rel=1e-12)
+    star = direction(ra, dec)
+    east = np.array([-math.sin(math.radians(ra)), math.cos(math.radians(ra)), 0.0])
+    across = directions @ east * HEIGHT / math.pi
+    up = directions @ np.cross(star, east) * HEIGHT / math.pi
+    assert np.sum(share * across**2) == pytest.approx(4.0, rel=0.02)
+    assert np.sum(share * up**2) == pytest.approx(4.0, rel=0.02)
+    assert abs(np.sum(share * across * up)) < 0.02
+
+
+def test_the_seam_is_invisible() -> None:
+    on_the_seam = draw_stars(one_star(180.0, 20.0), 256)
+    np.testing.assert_allclose(on_the_seam, on_the_seam[:, ::-1], rtol=1e-9, atol=1e-9 * on_the_seam.max())
+    assert on_the_seam[:, 0].max() > 0.3 * on_the_seam.max()
+    # The glow goes on across the seam as smoothly as anywhere else.
+    glow = unresolved_glow(0.0)(texel_directions(np.arange(256), 256))
+    steps = np.abs(np.diff(glow, axis=1, append=glow[:, :1]))
+    assert steps[:, -1].max() <= steps[:, :-1].max()
+    assert steps[:, -1].max() < 0.03 * glow.max()
+
+
+def test_hot_stars_are_blue_and_cool_stars_are_red() -> None:
+    # Rigel, Sirius, the Sun, Arcturus, Betelgeuse
+    colours = black_body_colour(temperature_from_colour_index([-0.03, 0.01, 0.65, 1.23, 1.85]))
+    blue_over_red = colours[:, 2] / colours[:, 0]
+    assert np.all(np.diff(blue_over_red) < 0.0)
+    assert blue_over_red[0] > 1.0 > blue_over_red[2]
+    np.testing.assert_allclose(colours @ LUMINANCE_WEIGHTS, 1.0, rtol=1e-12)
+
+
+def test_temperature_of_the_sun() -> None:
+    # B-V = 0.65 gives 5778 K (IAU nominal 5772 K).
+    assert temperature_from_colour_index(0.65) == pytest.approx(5772.0, abs=20.0)
+    assert temperature_from_colour_index(math.nan) == pytest.approx(6600.0, abs=50.0)
+
+
+@pytest.mark.parametrize(
+    ("temperature", "x", "y"),
+    # Chromaticities of Planckian radiators: Wyszecki & Stiles 1982, "Color Science", table 1(3.11).
+    [(3000.0, 0.4369, 0.4041), (5000.0, 0.3451, 0.3516), (6500.0, 0.3135, 0.3237), (10000.0, 0.2807, 0.2884)],
+)
+def test_black_body_chromaticity(temperature: float, x: float, y: float) -> None:
+    rec709_to_xyz = np.array(  # IEC 61966-2-1
+        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    )
+    tristimulus = rec709_to_xyz @ black_body_colour(temperature)
+    np.testing.assert_allclose(tristimulus[:2] / tristimulus.sum(), [x, y], atol=0.003)
+
+
+def test_extreme_stars_have_a_colour_within_the_gamut() -> None:
+    colours = black_body_colour(temperature_from_colour_index([-0.4, 5.46]))
+    assert np.all(np.isfinite(colours))
+    assert np.all(colours >= 0.0)
+    assert colours[1, 2] == 0.0
+
+
+def test_galactic_axes_point_to_the_centre_and_the_pole() -> None:
+    axes = galactic_axes()
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    # Centre 17h 45m 37.2s -28 56' 10", pole 12h 51m 26.3s +27 07' 42" (J2000).
+    np.testing.assert_allclose(axes[0], direction(266.4050, -28.9362), atol=2e-5)
+    np.testing.assert_allclose(axes[2], direction(192.8595, 27.1283), atol=2e-5)
+
+
+def test_the_glow_has_the_sky_s_brightness() -> None:
+    """Integrated starlight: some 10 to 50 S10 at the poles, hundreds in the plane, most near the centre."""
+    glow = unresolved_glow(0.0)
+    centre, sideways, pole = galactic_axes()
+    assert 10.0 < glow(pole) / S10 < 50.0
+    assert 100.0 < glow(sideways) / S10 < 400.0
+    assert 50.0 < glow(-centre) / S10 < glow(sideways) / S10
+    assert glow(pole) == pytest.approx(glow(-pole))
+    # Dust hides the centre itself: the sky is brightest a few degrees beside the plane.
+    tilted = math.cos(math.radians(5)) * centre + math.sin(math.radians(5)) * pole
+    assert 400.0 < glow(tilted) / S10 < 1200.0
+    assert glow(tilted) > glow(centre)
+
+
+def test_no_light_is_counted_twice() -> None:
+    """The glow and the drawn stars together are the model's light, however many stars are drawn."""
+    height = 128
+    everywhere = texel_directions(np.arange(height), height)
+    omega = row_solid_angles(height)[:, np.newaxis]
+    total = np.sum(unresolved_glow(0.0)(everywhere) * omega)
+    for limit in (4.0, 8.0):
+        drawn = float(load_stars(limit).flux.sum())
+        rest = unresolved_glow(drawn)(everywhere)
+        assert np.all(rest >= 0.0)
+        assert np.sum(rest * omega) + drawn == pytest.approx(total, rel=3e-3)
+    assert not np.any(unresolved_glow(1e6)(everywhere))
+
+
+def test_the_sky_is_the_stars_and_the_glow() -> None:
+    picture, alone = star_sky(64), star_sky(64, galactic_glow=False)
+    glow = (
+        unresolved_glow(float(load_stars().flux.sum()))(texel_directions(np.arange(64), 64)) * ZERO_MAGNITUDE
+    )
+    np.testing.assert_allclose((picture - alone) @ LUMINANCE_WEIGHTS, glow, rtol=2e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"height": 8}, "8 texels high is too small; give at least 16"),
+        ({"height": 64, "star_width": 0.0}, "star width of 0.0 texels is not drawable"),
+        ({"height": 64, "magnitude_limit": math.nan}, "magnitude limit is not a number"),
+    ],
+)
+def test_impossible_skies_are_refused(arguments: dict, sentence: str) -> None:
+    with pytest.raises(BlackHoleError, match=sentence):
+        star_sky(**arguments)
