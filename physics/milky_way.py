@@ -3,14 +3,14 @@
 
 The model
 ---------
-Starlight is emitted by a double-exponential disc, dimmed by a double-exponential disc of dust, and summed along
-each line of sight; the Sun is in the plane. Every number is published, none is adjusted to the picture:
+Starlight is emitted by a double-exponential disc, dimmed by a double-exponential disc of dust, and summed
+along each line of sight; the Sun is in the plane. Every number is published, none is adjusted to the picture:
 
-* disc of stars: scale height 300 pc, scale length 2600 pc (Juric et al. 2008, ApJ 673, 864); luminosity of the
-  column through the disc at the Sun 24.4 solar luminosities per square parsec in V, colour from its
+* disc of stars: scale height 300 pc, scale length 2600 pc (Juric et al. 2008, ApJ 673, 864); luminosity of
+  the column through the disc at the Sun 24.4 solar luminosities per square parsec in V, colour from its
   mass-to-light ratios 1.4 in B and 1.5 in V (Flynn et al. 2006, MNRAS 372, 1149);
-* dust: extinction 0.7 mag/kpc in V at the Sun, scale height 140 pc, scale length 4500 pc (the diffuse extinction
-  of the Besancon model, Robin et al. 2003, A&A 409, 523);
+* dust: extinction 0.7 mag/kpc in V at the Sun, scale height 140 pc, scale length 4500 pc (the diffuse
+  extinction of the Besancon model, Robin et al. 2003, A&A 409, 523);
 * distance of the galactic centre 8 kpc (Reid 1993, ARA&A 31, 345); the Sun's absolute magnitude 4.81 in V
   (Willmer 2018, ApJS 236, 47).
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A panorama of the real night sky: every star to magnitude 8, and the glow of the Milky Way.
 
-Stars are drawn as small Gaussian spots on the sphere, not on the panorama, so they are round in every direction,
-at the celestial poles too, and each spot's light adds up to exactly what the star's magnitude says.
+Stars are drawn as small Gaussian spots on the sphere, not on the panorama, so they are round in every
+direction, at the celestial poles too, and each spot's light adds up to exactly what the star's magnitude says.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def texel_directions(rows: NDArray[np.intp], height: int) -> Array:
 
 
 def row_solid_angles(height: int) -> Array:
-    """Solid angle in steradians of a texel of each row of a panorama twice as wide as high, shape (height,)."""
+    """Solid angle (sr) of a texel of each row of a panorama twice as wide as high, shape (height,)."""
     edges = np.cos(np.linspace(0.0, math.pi, height + 1))
     solid_angles: Array = (edges[:-1] - edges[1:]) * math.pi / height
     return solid_angles
@@ -133,8 +133,8 @@ def draw_stars(stars: Stars, height: int, star_width: float = 0.6) -> Array:
     Returns
     -------
     ndarray, shape (height, 2 * height, 3)
-        Linear Rec. 709 radiance in units of `ZERO_MAGNITUDE`: the luminance times the texels' solid angles adds
-        up to the stars' fluxes.
+        Linear Rec. 709 radiance in units of `ZERO_MAGNITUDE`: the luminance times the texels' solid angles
+        adds up to the stars' fluxes.
     """
     width = 2 * height
     texel = math.pi / height
@@ -181,7 +181,7 @@ def draw_stars(stars: Stars, height: int, star_width: float = 0.6) -> Array:
 
 
 def _column_reaches(declination: Array, reach: float, width: int) -> NDArray[np.intp]:
-    """How many columns a spot of this angular reach spans to either side, a power of two or half the width."""
+    """How many columns a spot of this angular reach spans to each side: a power of two or half the width."""
     furthest = np.abs(declination) + reach
     with np.errstate(divide="ignore"):
         # sin(half the turn) <= sin(half the reach) / cos(latitude), at the latitude closest to the pole
@@ -217,8 +217,8 @@ def star_sky(
     -------
     ndarray of float32, shape (height, 2 * height, 3)
         Linear Rec. 709 radiance; row 0 is the top, declination +90 degrees. A direction (x, y, z), with x
-        towards right ascension 0, y towards 6 h and z north, is found at u = 0.5 - atan2(y, x) / (2 pi) from the
-        left and v = 0.5 + asin(z) / pi from the bottom, Blender's convention. A star of magnitude 0 carries
+        towards right ascension 0, y towards 6 h and z north, is found at u = 0.5 - atan2(y, x) / (2 pi) from
+        the left and v = 0.5 + asin(z) / pi from the bottom, Blender's convention. A star of magnitude 0 carries
         `ZERO_MAGNITUDE`.
 
     Raises
