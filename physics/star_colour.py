@@ -83,7 +83,7 @@ def black_body_colour(temperature: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Red, green and blue, >= 0: clipped to the edge of the gamut where outside (deep red, below some 1900 K).
+        Red, green and blue, >= 0: clipped to the gamut's edge where outside (deep red, below some 1900 K).
 
     Notes
     -----

@@ -2,7 +2,7 @@
 """A panorama of the real night sky: every star to magnitude 8, and the glow of the Milky Way.
 
 Stars are drawn as small Gaussian spots on the sphere, not on the panorama, so they are round in every
-direction, at the celestial poles too, and each spot's light adds up to exactly what the star's magnitude says.
+direction, at the celestial poles too, and each spot's light adds up to what its magnitude says exactly.
 """
 
 from __future__ import annotations
@@ -218,8 +218,8 @@ def star_sky(
     ndarray of float32, shape (height, 2 * height, 3)
         Linear Rec. 709 radiance; row 0 is the top, declination +90 degrees. A direction (x, y, z), with x
         towards right ascension 0, y towards 6 h and z north, is found at u = 0.5 - atan2(y, x) / (2 pi) from
-        the left and v = 0.5 + asin(z) / pi from the bottom, Blender's convention. A star of magnitude 0 carries
-        `ZERO_MAGNITUDE`.
+        the left and v = 0.5 + asin(z) / pi from the bottom, Blender's convention. A star of magnitude 0
+        carries `ZERO_MAGNITUDE`.
 
     Raises
     ------
