@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Umbra Black Hole: a physically exact rotating black hole in a Blender scene."""
+
+from collections.abc import Callable
+
+import bpy
+
+from . import handlers, operators, panels, properties
+
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+
+# What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then fails
+# loudly, so that it can be tried again.
+_undo: list[Callable[[], None]] = []
+
+
+def register() -> None:
+    """Register the add-on with Blender."""
+    if _undo:
+        raise RuntimeError("Umbra Black Hole is registered already.")
+    try:
+        for each in _CLASSES:
+            bpy.utils.register_class(each)
+            _undo.append(lambda each=each: bpy.utils.unregister_class(each))
+        for module in (properties, operators, handlers):
+            module.register()
+            _undo.append(module.unregister)
+    except BaseException:
+        unregister()
+        raise
+
+
+def unregister() -> None:
+    """Take everything out of Blender again."""
+    while _undo:
+        _undo.pop()()

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake warp maps: the work is a generator, drained where Blender has no window and stepped by a timer where it has.
+
+A generator is resumed from Blender's event loop, where undo or a newly loaded file may have replaced every
+datablock since the last time. So it holds names, and looks the scene up each time.
+"""
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from . import compositing, maps, shot
+from ._physics import physics
+from .errors import SceneError
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far baking has come."""
+
+    frame: int
+    fraction: float
+    """Share of all the work that is done, 0..1."""
+    text: str
+
+
+@dataclass
+class Summary:
+    """What was done."""
+
+    baked: list[int] = field(default_factory=list)
+    reused: list[int] = field(default_factory=list)
+    folder: maps.MapFolder | None = None
+    unresolved: int = 0
+    """Rays that no fate was found for within the allowed number of steps."""
+
+    def sentence(self) -> str:
+        """One sentence for the artist."""
+        parts = []
+        if self.baked:
+            parts.append(f"baked {_count(len(self.baked), 'warp map')}")
+        if self.reused:
+            parts.append(
+                f"{_count(len(self.reused), 'map')} still {'holds' if len(self.reused) == 1 else 'hold'}"
+            )
+        text = (", ".join(parts) or "Nothing to bake").capitalize()
+        if self.folder is not None and self.folder.is_temporary:
+            text += f"; this file is not saved yet, so the maps are in a temporary folder: {self.folder.path}"
+        return text + "."
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def bake_map(
+    path: Path, parameters: "physics.WarpMapParameters"
+) -> Generator[float, None, "physics.WarpMap"]:
+    """Bake one map into a file; yields the fraction done, and returns the map.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        The parameters are impossible, or the file cannot be written.
+    """
+    maps.prepare(path, parameters.map_size)
+    warp_map = yield from physics.bake_steps(parameters)
+    physics.write_warp_map(path, warp_map)
+    return warp_map
+
+
+def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
+    """Where the map of a shot lies, or will lie."""
+    return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
+
+
+def bake_frames(
+    scene_name: str, frames: Iterable[int], view_layer_name: str | None = None
+) -> Generator[Progress, None, Summary]:
+    """Bake the maps of some frames of a scene, those that do not hold any more or are missing.
+
+    The scene stands at its own frame whenever the generator yields. Closing the generator cancels the work;
+    maps that are finished stay.
+
+    Parameters
+    ----------
+    scene_name : str
+        The scene.
+    frames : iterable of int
+        Frames in the order of baking.
+    view_layer_name : str, optional
+        The view layer whose objects count; the scene's first by default.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        As one sentence, which names the frame where there are several.
+    """
+    wanted = list(frames)
+    summary = Summary()
+    for index, frame in enumerate(wanted):
+        scene = bpy.data.scenes.get(scene_name)
+        if scene is None:
+            raise SceneError(f'Scene "{scene_name}" is gone: baking has stopped.')
+        text = f"Frame {frame}" + (f" ({index + 1} of {len(wanted)})" if len(wanted) > 1 else "")
+        try:
+            layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+            frame_shot = shot.read_at(scene, frame, layer)
+            path = path_of(scene, frame_shot)
+            summary.folder = maps.folder(scene)
+            yield Progress(frame, index / len(wanted), text)
+            if maps.is_fresh(path, frame_shot.parameters):
+                summary.reused.append(frame)
+                continue
+            steps = bake_map(path, frame_shot.parameters)
+            while True:
+                try:
+                    fraction = next(steps)
+                except StopIteration as end:
+                    summary.unresolved += end.value.counts.get("unresolved", 0)
+                    break
+                yield Progress(frame, (index + fraction) / len(wanted), text)
+            summary.baked.append(frame)
+        except physics.BlackHoleError as error:
+            prefix = f"Frame {frame}: "
+            if len(wanted) == 1 or str(error).startswith(prefix):
+                raise
+            raise SceneError(prefix + str(error)) from error
+    finish(scene_name)
+    return summary
+
+
+def finish(scene_name: str) -> None:
+    """Let the compositor see new maps."""
+    scene = bpy.data.scenes.get(scene_name)
+    if scene is not None and compositing.find_setup(scene) is not None:
+        compositing.refresh(scene)
+        compositing.forget_loaded_map(scene)
+
+
+def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) -> Summary:
+    """Run a bake to its end; with `announce`, its progress is printed, at most once for each tenth of the work."""
+    told = -1
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as end:
+            return end.value
+        tenth = int(progress.fraction * 10)
+        if announce and tenth != told:
+            told = tenth
+            print(f"Umbra: baking warp maps {progress.fraction:4.0%}  {progress.text}", flush=True)

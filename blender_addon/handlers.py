@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake what is missing when Blender renders, and never let a wrong picture pass for a right one.
+
+For each frame Blender calls render_pre, then frame_change_post with the render's own dependency graph, in which
+animation, constraints and the camera of this frame are evaluated; then it renders and runs the compositor. So
+render_pre takes the map away (the picture is magenta now), and only frame_change_post gives a valid one back.
+render_post comes before the picture is written, and sees whether that happened.
+"""
+
+import atexit
+from collections.abc import Callable
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import baking, compositing, maps, messages, node_group, shot
+from ._physics import physics
+from .errors import SceneError
+
+# Scenes whose current frame is being rendered and has no valid map yet, by name.
+_waiting: dict[str, str] = {}
+# The compositor device of scenes that are being rendered without a window, to be set back.
+_devices: dict[str, str] = {}
+# Scenes that an error was already shown for in this render.
+_told: set[str] = set()
+# Set while this module itself steps the scene to other frames.
+_busy = False
+
+_NOT_EVALUATED = "none of its view layers was rendered; enable one, or connect a Render Layers node"
+
+
+def _guarded(work: Callable[[bpy.types.Scene], None], scene: bpy.types.Scene) -> None:
+    """Run a handler's work; what goes wrong must be seen, because Blender swallows exceptions here."""
+    try:
+        work(scene)
+    except physics.BlackHoleError as error:
+        _fail(scene, str(error))
+    except Exception as error:  # noqa: BLE001  a fault of ours must not end as a wrong picture either
+        _fail(scene, f"An unexpected fault ({type(error).__name__}: {error}); please report it.")
+
+
+def _fail(scene: bpy.types.Scene, text: str) -> None:
+    _waiting.pop(scene.name, None)
+    if bpy.app.background:
+        _restore_device(scene)
+        messages.end_process(text)
+    compositing.point_at_nothing(scene)
+    messages.warn(text)
+    if scene.name not in _told:
+        _told.add(scene.name)
+        messages.popup(text)
+
+
+# --- rendering ------------------------------------------------------------------------------------
+
+
+@persistent
+def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
+    """A render begins, of one frame or many."""
+    _told.discard(scene.name)
+    if not compositing.is_in_use(scene):
+        return
+    if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
+        # without a display there is usually no OpenGL, and Blender's GPU compositor ends the process without it
+        _devices[scene.name] = scene.render.compositor_device
+        scene.render.compositor_device = "CPU"
+    _guarded(compositing.sync_sky, scene)
+
+
+@persistent
+def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
+    """A frame begins."""
+    if not compositing.is_in_use(scene):
+        return
+    _waiting[scene.name] = _NOT_EVALUATED
+    _guarded(compositing.point_at_nothing, scene)
+
+
+@persistent
+def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """The frame is evaluated."""
+    if _busy or depsgraph is None or depsgraph.mode != "RENDER" or scene.name not in _waiting:
+        return
+    _guarded(lambda each: _provide_map(each, depsgraph), scene)
+
+
+@persistent
+def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
+    """The frame is composited and not written yet."""
+    reason = _waiting.pop(scene.name, None)
+    if reason is not None:
+        _fail(scene, f'Frame {scene.frame_current} of scene "{scene.name}" has no warp map: {reason}.')
+
+
+@persistent
+def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
+    """The render is complete or cancelled."""
+    _waiting.pop(scene.name, None)
+    _restore_device(scene)
+    compositing.refresh(scene)
+
+
+def _restore_device(scene: bpy.types.Scene) -> None:
+    device = _devices.pop(scene.name, None)
+    if device is not None:
+        scene.render.compositor_device = device
+
+
+def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Make sure that the map of the frame being rendered is right, and let the compositor read it."""
+    global _busy
+    _busy = True
+    try:
+        frame_shot = shot.read(scene, depsgraph)
+    finally:
+        _busy = False
+    parameters = frame_shot.parameters
+    path = baking.path_of(scene, frame_shot)
+    if not maps.is_fresh(path, parameters):
+        if not scene.umbra.auto_bake:
+            raise SceneError(
+                f"The warp map of frame {frame_shot.frame} is missing or out of date: bake it, or switch on Bake When "
+                "Rendering in the Umbra panel."
+            )
+        print(f"Umbra: baking the warp map of frame {frame_shot.frame}", flush=True)
+        for _fraction in baking.bake_map(path, parameters):
+            pass
+    compositing.point_at_maps(scene)
+    del _waiting[scene.name]
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@persistent
+def on_load_post(_path: str = "", _unused: object = None) -> None:
+    """A file was opened: bring node groups of an older version of this add-on up to date."""
+    _waiting.clear()
+    _devices.clear()
+    for scene in bpy.data.scenes:
+        setup = compositing.find_setup(scene)
+        if setup is not None and setup.group.library is None:
+            setup.group.node_tree = node_group.ensure_group()
+            compositing.refresh(scene)
+
+
+@persistent
+def on_save_pre(path: str = "", _unused: object = None) -> None:
+    """A file is about to be saved: it should refer to the maps of the settings that are saved."""
+    for scene in bpy.data.scenes:
+        if compositing.find_setup(scene) is not None:
+            compositing.refresh(scene)
+
+
+# --- registration ---------------------------------------------------------------------------------
+
+_HANDLERS = {
+    "render_init": on_render_init,
+    "render_pre": on_render_pre,
+    "frame_change_post": on_frame_change_post,
+    "render_post": on_render_post,
+    "render_complete": on_render_end,
+    "render_cancel": on_render_end,
+    "load_post": on_load_post,
+    "save_pre": on_save_pre,
+}
+
+
+def register() -> None:
+    """Attach the handlers."""
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+    # handlers that are still attached when Python ends make Blender 4.5 hang
+    atexit.register(_detach)
+
+
+def unregister() -> None:
+    """Detach the handlers."""
+    atexit.unregister(_detach)
+    _detach()
+    messages.forget()
+
+
+def _detach() -> None:
+    for name, handler in _HANDLERS.items():
+        attached = getattr(bpy.app.handlers, name)
+        if handler in attached:
+            attached.remove(handler)

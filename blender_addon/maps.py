@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where warp maps lie, and whether they still hold.
+
+A map's name tells scene, hole, size and frame, so that a test at half the resolution loses nothing that was baked.
+Blender reads the maps as an image sequence. The sequence is cyclic with a length of a million, because that is how
+one fixed setting maps every frame to a number of its own, negative frames too (file names have no minus signs):
+frame f is file f, and frame -5 is file 999995.
+"""
+
+import errno
+import os
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ._physics import physics
+from .errors import MapFolderError, SceneError
+
+SEQUENCE_LENGTH = 1_000_000
+# Frames that have a file of their own.
+FIRST_FRAME, LAST_FRAME = -100_000, SEQUENCE_LENGTH - 100_001
+
+BYTES_PER_PIXEL = 16  # four float32, before compression: an upper bound for the size of a map
+
+DEFAULT_FOLDER = "//umbra_maps/"
+_TEMPORARY_FOLDER = "umbra_maps"
+
+
+@dataclass(frozen=True)
+class MapFolder:
+    """A folder of warp maps: as Blender's data refer to it, and where it is."""
+
+    blender_path: str
+    path: Path
+    is_temporary: bool
+
+
+def folder(scene: bpy.types.Scene) -> MapFolder:
+    """The folder of a scene's maps; a temporary one where it should be beside a file that is not saved yet."""
+    chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
+    if chosen.startswith("//") and not bpy.data.filepath:
+        path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
+        return MapFolder(str(path) + os.sep, path, True)
+    return MapFolder(chosen.rstrip("/\\") + "/", Path(bpy.path.abspath(chosen)), False)
+
+
+def stem(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int]) -> str:
+    """A map's file name up to the frame's number; `size` is the map's own, supersampling included."""
+    names = "_".join(bpy.path.clean_name(name) for name in (scene.name, hole_name))
+    return f"{names}_{size[0]}x{size[1]}_"
+
+
+def file_name(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
+    """A map's file name.
+
+    Raises
+    ------
+    SceneError
+        The frame is beyond the numbers that file names have room for.
+    """
+    if not FIRST_FRAME <= frame <= LAST_FRAME:
+        raise SceneError(
+            f"Frame {frame} is outside {FIRST_FRAME} to {LAST_FRAME}, the frames that warp maps can be numbered by: "
+            "move the animation."
+        )
+    return f"{stem(scene, hole_name, size)}{frame % SEQUENCE_LENGTH:04d}.exr"
+
+
+def map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> Path:
+    """Where the map of a frame lies, or will lie."""
+    return folder(scene).path / file_name(scene, hole_name, size, frame)
+
+
+def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
+    """The same path as an image datablock should carry it: relative to the .blend file where that is saved."""
+    return folder(scene).blender_path + file_name(scene, hole_name, size, frame)
+
+
+def is_fresh(path: Path, parameters: "physics.WarpMapParameters") -> bool:
+    """Whether a map exists and was made by exactly these parameters. A damaged or foreign file is not fresh."""
+    if not path.is_file():
+        return False
+    try:
+        metadata = physics.read_warp_map_metadata(path)
+    except physics.WarpMapError:
+        return False
+    return metadata.get("hash") == parameters.hash
+
+
+def count_baked(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frames: range) -> int:
+    """Number of the frames that have a map, up to date or not."""
+    beginning = stem(scene, hole_name, size)
+    try:
+        with os.scandir(folder(scene).path) as entries:
+            numbers = {
+                int(entry.name[len(beginning) : -4])
+                for entry in entries
+                if entry.name.startswith(beginning)
+                and entry.name.endswith(".exr")
+                and entry.name[len(beginning) : -4].isdecimal()
+            }
+    except OSError:
+        return 0
+    return sum(frame % SEQUENCE_LENGTH in numbers for frame in frames)
+
+
+def prepare(path: Path, size: tuple[int, int]) -> None:
+    """Make sure, before any work is done, that a map of this size can be written there.
+
+    Raises
+    ------
+    MapFolderError
+        The folder cannot be made or written to, or the disk is full.
+    """
+    parent = path.parent
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=parent):
+            pass
+        free = shutil.disk_usage(parent).free
+    except OSError as error:
+        raise explain(error, parent) from error
+    needed = size[0] * size[1] * BYTES_PER_PIXEL
+    if free < needed:
+        raise MapFolderError(
+            f"The disk of the warp map folder {parent} is full: {free / 1e6:.0f} MB are free, a map needs up to "
+            f"{needed / 1e6:.0f} MB; free some space or choose another folder."
+        )
+
+
+def explain(error: OSError, place: Path) -> MapFolderError:
+    """The sentence for a failure of the file system."""
+    if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
+        return MapFolderError(
+            f"The disk of the warp map folder {place} is full: free some space or choose another folder."
+        )
+    reason = error.strerror or str(error)
+    return MapFolderError(
+        f"The warp map folder {place} cannot be written to ({reason}): choose another folder in the Umbra panel, or "
+        "change its permissions."
+    )
+
+
+def adopt(source: Path, target: Path) -> int:
+    """Copy maps from a temporary folder to the folder beside the file, once it has been saved.
+
+    Maps that are there already are kept. Returns the number of maps copied.
+    """
+    copied = 0
+    for path in sorted(source.glob("*.exr")):
+        destination = target / path.name
+        if destination.exists():
+            continue
+        target.mkdir(parents=True, exist_ok=True)
+        partial = destination.with_name(f".{destination.name}.part")
+        shutil.copyfile(path, partial)
+        os.replace(partial, destination)
+        copied += 1
+    return copied
+
+
+def frames_of(scene: bpy.types.Scene) -> range:
+    """The frames that rendering the scene's animation renders."""
+    return range(scene.frame_start, scene.frame_end + 1, max(scene.frame_step, 1))

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tell the artist what went wrong while rendering, where no operator can report it."""
+
+import os
+import sys
+import textwrap
+
+import bpy
+
+POPUP_WIDTH = 80  # characters a line
+
+_pending: list[str] = []
+
+
+def warn(text: str) -> None:
+    """Say something worth knowing on the console."""
+    print(f"Umbra: {text}", file=sys.stderr, flush=True)
+
+
+def popup(text: str) -> None:
+    """Show a sentence in the window as soon as Blender's main thread is free; safe from a render's thread."""
+    if text in _pending:
+        return
+    _pending.append(text)
+    if not bpy.app.timers.is_registered(_show_pending):
+        bpy.app.timers.register(_show_pending)
+
+
+def _show_pending() -> None:
+    texts, _pending[:] = list(_pending), []
+    if not texts or not bpy.context.window_manager.windows:
+        return
+    lines = [line for text in texts for line in textwrap.wrap(text, POPUP_WIDTH)]
+
+    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+        for line in lines:
+            menu.layout.label(text=line)
+
+    # a timer runs outside any window, and a popup needs one
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.context.window_manager.popup_menu(draw, title="Umbra Black Hole", icon="ERROR")
+
+
+def forget() -> None:
+    """Drop what has not been shown yet."""
+    _pending.clear()
+    if bpy.app.timers.is_registered(_show_pending):
+        bpy.app.timers.unregister(_show_pending)
+
+
+def end_process(text: str) -> None:
+    """End a process without a window with exit status 1, before it can write a wrong picture.
+
+    Blender swallows exceptions of handlers and goes on rendering, so ending the process is the only way for a
+    render farm or a script to learn of the failure. Frames that are already written stay.
+    """
+    print(f"Error: Umbra Black Hole: {text}", file=sys.stderr)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(1)

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist sets and Blender saves: the hole on its object, the rendering of it on the scene."""
+
+import bpy
+
+from ._physics import metric, physics
+
+# physics accepts spins up to this; a hole spinning the other way is the object turned over.
+LARGEST_SPIN = 0.9999
+
+# Blender draws Empties no smaller (scene units).
+SMALLEST_DISPLAY = 1e-4
+
+CAMERA_ANIMATION = "CAMERA_ANIMATION"
+
+# Identifiers are saved in files: Blender's enum -> the physics' name of the same motion.
+MOTIONS = {
+    "FIDO": "fido",
+    "STATIC": "static",
+    "CIRCULAR": "circular",
+    "CIRCULAR_RETROGRADE": "circular_retrograde",
+    "FREE_FALL": "free_fall",
+    CAMERA_ANIMATION: "velocity",
+}
+
+TOLERANCES = {"DRAFT": 1e-4, "STANDARD": physics.DEFAULT_TOLERANCE, "REFERENCE": 1e-11}
+
+METHOD_LABELS = {
+    "cash-karp": ("Regularised", "Geodesics in Mino time: exact everywhere, also through the poles"),
+    "cash-karp-printed": (
+        "Boyer-Lindquist",
+        "Geodesics as printed in the source paper: a check of the other form. It cannot carry rays through "
+        "the poles",
+    ),
+}
+
+
+def _show_horizon(settings: "UmbraHoleProperties", _context: object) -> None:
+    """Draw the Empty's sphere at the size of the horizon."""
+    hole = settings.id_data
+    if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
+        hole.empty_display_size = max(
+            metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY
+        )
+
+
+class UmbraHoleProperties(bpy.types.PropertyGroup):
+    """A black hole. Its place, axis (local Z) and size are those of the object."""
+
+    is_black_hole: bpy.props.BoolProperty(
+        name="Black Hole",
+        description="This object is a black hole: its origin is the centre, its local Z the axis of rotation",
+        default=False,
+        update=_show_horizon,
+        options=set(),
+    )
+    spin: bpy.props.FloatProperty(
+        name="Spin",
+        description="How fast the hole rotates: 0 does not rotate, 1 would be the fastest possible. "
+        "The shadow is flattened on the side that turns towards the camera",
+        default=0.9,
+        min=0.0,
+        max=LARGEST_SPIN,
+        precision=4,
+        step=1,
+        update=_show_horizon,
+    )
+    mass_scale: bpy.props.FloatProperty(
+        name="Size of 1 M",
+        description="Length of one gravitational radius (G M / c^2) in scene units, before the object's own "
+        "scale. The shadow is about ten of these across",
+        default=0.25,
+        min=1e-9,
+        soft_min=0.001,
+        soft_max=100.0,
+        precision=4,
+        unit="LENGTH",
+        update=_show_horizon,
+    )
+    motion: bpy.props.EnumProperty(
+        name="Camera Motion",
+        description="How the camera moves: this shifts directions (aberration) and colours (Doppler effect)",
+        items=(
+            (
+                "FIDO",
+                "Carried by Space",
+                "Held in place, and carried round by the hole's rotation (the local fiducial observer)",
+            ),
+            ("STATIC", "At Rest", "At rest against the stars; impossible inside the ergosphere"),
+            (
+                "CIRCULAR",
+                "Circular Orbit",
+                "Abreast of the circular orbit of the same radius that runs with the hole's rotation",
+            ),
+            (
+                "CIRCULAR_RETROGRADE",
+                "Circular Orbit, Retrograde",
+                "Abreast of the circular orbit of the same radius that runs against the hole's rotation",
+            ),
+            ("FREE_FALL", "Free Fall", "Falling in, from rest at infinity"),
+            (
+                CAMERA_ANIMATION,
+                "Camera Animation",
+                "As the camera's own animation moves it in the scene, "
+                "measured at each frame against the speed of light set below",
+            ),
+        ),
+        default="FIDO",
+    )
+    speed_of_light: bpy.props.FloatProperty(
+        name="Speed of Light",
+        description="Scene units that light covers in a second; the camera's animation is measured against it",
+        default=100.0,
+        min=1e-6,
+        soft_min=0.1,
+        soft_max=1e5,
+        precision=3,
+    )
+
+
+def _is_hole(_settings: object, candidate: bpy.types.Object) -> bool:
+    return candidate.umbra.is_black_hole
+
+
+class UmbraSceneProperties(bpy.types.PropertyGroup):
+    """How a scene's black hole is rendered."""
+
+    active_hole: bpy.props.PointerProperty(
+        name="Black Hole",
+        description="The black hole that is rendered; one a scene",
+        type=bpy.types.Object,
+        poll=_is_hole,
+    )
+    map_folder: bpy.props.StringProperty(
+        name="Warp Maps",
+        description="Folder of the warp maps, one file a frame. // means beside the .blend file; a file that "
+        "is not saved yet uses a temporary folder",
+        default="//umbra_maps/",
+        subtype="DIR_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    supersampling: bpy.props.EnumProperty(
+        name="Samples",
+        description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples smooth "
+        "the finest images of the sky beside it",
+        items=(
+            ("1", "1 x 1", "One ray a pixel"),
+            ("2", "2 x 2", "Four rays a pixel"),
+            ("4", "4 x 4", "Sixteen rays a pixel"),
+        ),
+        default="1",
+        options=set(),
+    )
+    quality: bpy.props.EnumProperty(
+        name="Accuracy",
+        description="Error allowed in one step of a ray's integration",
+        items=(
+            ("DRAFT", "Draft", "1e-4 rad a step: quick, for trying things out"),
+            (
+                "STANDARD",
+                "Standard",
+                f"{physics.DEFAULT_TOLERANCE:g} rad a step: exact to a small share of a pixel",
+            ),
+            ("REFERENCE", "Reference", "1e-11 rad a step: as exact as the arithmetic allows"),
+            ("CUSTOM", "Custom", "A tolerance of your own"),
+        ),
+        default="STANDARD",
+        options=set(),
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Error allowed in one step of a ray's integration, radians",
+        default=physics.DEFAULT_TOLERANCE,
+        min=1e-13,
+        max=1e-2,
+        precision=10,
+        options=set(),
+    )
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="The form of the equations that is integrated",
+        items=tuple((name, *METHOD_LABELS.get(name, (name, ""))) for name in physics.METHODS),
+        default=physics.DEFAULT_METHOD,
+        options=set(),
+    )
+    environment_source: bpy.props.EnumProperty(
+        name="Sky",
+        description="What the sky around the hole is made of",
+        items=(
+            (
+                "WORLD",
+                "World",
+                "The Environment Texture of the scene's World, with its rotation and strength",
+            ),
+            ("IMAGE", "Image", "An equirectangular image chosen here"),
+        ),
+        default="WORLD",
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
+    environment_image: bpy.props.PointerProperty(
+        name="Sky Image",
+        description="An equirectangular picture of the whole sky",
+        type=bpy.types.Image,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    auto_bake: bpy.props.BoolProperty(
+        name="Bake When Rendering",
+        description="Rendering bakes by itself each warp map that is missing or out of date. Switched off, such a "
+        "frame is an error",
+        default=True,
+        options=set(),
+    )
+
+
+def _refresh(settings: UmbraSceneProperties) -> None:
+    """Carry a change of the sky into the compositor, where the set-up is in place."""
+    from . import compositing  # compositing reads these properties, hence not at the top
+
+    scene = settings.id_data
+    if isinstance(scene, bpy.types.Scene) and compositing.find_setup(scene) is not None:
+        compositing.refresh(scene)
+
+
+def tolerance_of(settings: UmbraSceneProperties) -> float:
+    """The error allowed in one step, radians, from the chosen accuracy."""
+    return TOLERANCES.get(settings.quality, settings.tolerance)
+
+
+CLASSES = (UmbraHoleProperties, UmbraSceneProperties)
+
+
+def register() -> None:
+    """Attach the properties to objects and scenes."""
+    bpy.types.Object.umbra = bpy.props.PointerProperty(type=UmbraHoleProperties)
+    bpy.types.Scene.umbra = bpy.props.PointerProperty(type=UmbraSceneProperties)
+
+
+def unregister() -> None:
+    """Take the properties off again; their values stay in the file."""
+    del bpy.types.Scene.umbra
+    del bpy.types.Object.umbra

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel says about a scene: read from Blender and from the maps' headers, cheap enough for drawing."""
+
+import textwrap
+import time
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from . import baking, compositing, environment, maps, shot
+from ._physics import metric, physics
+from .properties import CAMERA_ANIMATION
+
+LINE_WIDTH = 44  # characters that a sidebar of ordinary width shows
+
+# Seconds for which the number of maps in the folder is not counted anew.
+COUNT_INTERVAL = 1.0
+_counted: dict[tuple[object, ...], tuple[float, int]] = {}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the panel."""
+
+    text: str
+    icon: str = "NONE"
+
+
+def wrapped(text: str, icon: str) -> tuple[Line, ...]:
+    """A sentence as lines, the icon in front of the first."""
+    parts = textwrap.wrap(text, LINE_WIDTH)
+    return tuple(Line(part, icon if index == 0 else "BLANK1") for index, part in enumerate(parts))
+
+
+def sky_problem(scene: bpy.types.Scene) -> str | None:
+    """Why the sky cannot be read, if so."""
+    try:
+        environment.check_image(environment.read(scene).image)
+    except physics.BlackHoleError as error:
+        return str(error)
+    return None
+
+
+def lines(context: bpy.types.Context) -> tuple[Line, ...]:
+    """The state of the scene's black hole at the current frame."""
+    scene = context.scene
+    if shot.find_active_hole(scene) is None and scene.umbra.active_hole is None and not shot.holes(scene):
+        return wrapped("This scene has no black hole.", "INFO")
+    try:
+        # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
+        now = shot.read(scene, context.evaluated_depsgraph_get(), velocity=np.zeros(3))
+    except physics.BlackHoleError as error:
+        return wrapped(str(error), "ERROR")
+    found: list[Line] = []
+    if compositing.find_setup(scene) is None:
+        found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
+    found += _map_lines(scene, now)
+    found += _place_lines(now)
+    others = len(shot.holes(scene)) - 1
+    if others > 0:
+        found += wrapped(
+            f"{others} more black hole{'s' if others > 1 else ''} in this scene: not rendered.", "INFO"
+        )
+    return tuple(found)
+
+
+def _map_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
+    folder = maps.folder(scene)
+    path = baking.path_of(scene, now)
+    found: list[Line] = []
+    if not path.is_file():
+        found += wrapped("This frame's warp map is not baked.", "RADIOBUT_OFF")
+    elif shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
+        found += wrapped("This frame's warp map is baked; rendering checks it.", "CHECKMARK")
+    elif maps.is_fresh(path, now.parameters):
+        found += wrapped("This frame's warp map is up to date.", "CHECKMARK")
+    else:
+        found += wrapped("This frame's warp map is out of date.", "FILE_REFRESH")
+    frames = maps.frames_of(scene)
+    found.append(Line(f"{_baked(scene, now, frames)} of {len(frames)} frames baked", "SEQUENCE"))
+    if folder.is_temporary:
+        found += wrapped("This file is not saved: its maps are in a temporary folder.", "INFO")
+    return found
+
+
+def _baked(scene: bpy.types.Scene, now: shot.Shot, frames: range) -> int:
+    size = now.parameters.map_size
+    key = (maps.folder(scene).path, maps.stem(scene, now.hole_name, size), frames)
+    moment, number = _counted.get(key, (-COUNT_INTERVAL, 0))
+    if time.monotonic() - moment >= COUNT_INTERVAL:
+        number = maps.count_baked(scene, now.hole_name, size, frames)
+        _counted.clear()
+        _counted[key] = (time.monotonic(), number)
+    return number
+
+
+def _place_lines(now: shot.Shot) -> list[Line]:
+    parameters = now.parameters
+    distance = now.distance
+    found = [Line(f"Camera at {distance:.4g} M", "CAMERA_DATA")]
+    polar_angle = float(np.arccos(np.clip(parameters.camera_position[2] / distance, -1.0, 1.0)))
+    if distance < metric.ergosphere_radius(parameters.spin, polar_angle):
+        found += wrapped("inside the ergosphere: nothing can be at rest here", "INFO")
+    elif distance < metric.isco_radius(parameters.spin):
+        found += wrapped("inside the innermost stable circular orbit", "INFO")
+    warning = physics.unstable_orbit_warning(parameters)
+    if warning is not None:
+        found += wrapped(warning, "INFO")
+    return found
