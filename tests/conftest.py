@@ -42,9 +42,11 @@ def extension_zip(build_extension: ModuleType, tmp_path_factory: pytest.TempPath
 @pytest.fixture(scope="session")
 def addon(extension_zip: Path) -> Iterator[ModuleType]:
     """The extension as a user has it, installed from its zip and enabled: bl_ext.user_default.<id>."""
-    import addon_utils
     import bpy
 
+    addon_utils = importlib.import_module(
+        "addon_utils"
+    )  # Blender's own; bpy must be imported before
     name = "bl_ext.user_default.umbra_black_hole"
     bpy.ops.extensions.package_install_files(
         repo="user_default", filepath=str(extension_zip), enable_on_install=True

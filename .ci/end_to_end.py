@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""End to end with a real Blender executable, named by UMBRA_REAL_BLENDER, as an artist would go about it.
+
+Installs the built zip by Blender's own command line, builds a small scene with the extension, renders two
+frames with nothing but `blender -b FILE -a`, and compares every pixel with numpy's reference rendering of the
+maps that this baked. Then it renders again, which must reuse the maps, and spoils the scene: that must end in
+exit status 1.
+
+    UMBRA_REAL_BLENDER=blender PYTHONPATH=. python .ci/end_to_end.py
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from build_extension import build, current_platform
+
+from physics import read_warp_map
+from physics.exr import read_exr, write_exr
+from physics.reference_render import render
+from physics.star_sky import star_sky
+
+SCENE_SCRIPT = Path(__file__).with_name("end_to_end_scene.py")
+SIZE = (160, 90)
+ROTATION = (0.1, 0.2, 0.7)
+STRENGTH = 0.8
+BALL_COLOUR = (0.1, 0.6, 0.2)
+# Where the ball is in the picture, generously: rows and columns. The rest is sky and hole.
+BALL_REGION = (slice(50, 90), slice(100, 160))
+TOLERANCE = 1e-4
+"""Largest difference allowed from the reference; the sky's values are about 1."""
+
+
+class Blender:
+    """A real Blender executable with user resources of its own."""
+
+    def __init__(self, executable: str, resources: Path) -> None:
+        self.executable = executable
+        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(resources)}
+
+    def run(self, *arguments: str | Path, status: int = 0) -> str:
+        """Run it and return what it printed; any other exit status than the expected one ends the test."""
+        command = [self.executable, *map(str, arguments)]
+        print("$ blender", *map(str, arguments), flush=True)
+        result = subprocess.run(
+            command,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=1800,
+            check=False,
+        )
+        if result.returncode != status:
+            sys.exit(f"{result.stdout}\nExit status {result.returncode}, expected {status}.")
+        return result.stdout
+
+
+def make_sky() -> np.ndarray:
+    """A sky that is different in every direction, smooth but for some stars: float32, shape (256, 512, 3)."""
+    rows, columns = np.mgrid[0:256, 0:512]
+    u, v = 2.0 * np.pi * (columns + 0.5) / 512, np.pi * (rows + 0.5) / 256
+    gradient = [0.3 + 0.25 * np.sin(u + channel) * np.sin(v) + 0.1 * np.cos(3.0 * v) for channel in range(3)]
+    stars = np.minimum(star_sky(256, magnitude_limit=4.0, star_width=1.0, galactic_glow=False), 1.0)
+    return (np.stack(gradient, axis=-1) + stars).astype(np.float32)
+
+
+def compare(folder: Path, sky: np.ndarray) -> None:
+    """Each picture against the reference; the ball against its own colour."""
+    maps = sorted(folder.rglob("umbra_maps/*.exr"))
+    pictures = sorted(folder.glob("picture_*.exr"))
+    if len(maps) != 2 or len(pictures) != 2:
+        sys.exit(f"Expected two maps and two pictures, found {maps} and {pictures}.")
+    for number, (map_path, picture_path) in enumerate(zip(maps, pictures, strict=True), start=1):
+        warp_map = read_warp_map(map_path)
+        expected = render(warp_map, sky, rotation=ROTATION, strength=STRENGTH).image[..., :3]
+        picture = read_exr(picture_path)[0][..., :3]
+        difference = np.abs(picture - expected)
+        difference[BALL_REGION] = 0.0
+        ball = np.all(np.abs(picture[BALL_REGION] - BALL_COLOUR) < 1e-3, axis=-1).sum()
+        shadow = np.count_nonzero(warp_map.visibility == 0.0)
+        print(
+            f"frame {number}: largest difference {difference.max():.1e}, shadow {shadow} px, ball {ball} px"
+        )
+        if picture.shape[:2] != SIZE[::-1] or difference.max() > TOLERANCE:
+            sys.exit(
+                f"Frame {number} differs from the reference by {difference.max():.3g}, allowed {TOLERANCE}."
+            )
+        if shadow < 100 or ball < 50:
+            sys.exit(
+                "The scene does not show what it should: a shadow of 100 pixels and a ball of 50 at least."
+            )
+    if np.array_equal(read_warp_map(maps[0]).theta, read_warp_map(maps[1]).theta):
+        sys.exit("The camera moves, but both frames have the same map.")
+
+
+def main() -> None:
+    """Run the whole test in a temporary folder."""
+    executable = os.environ.get("UMBRA_REAL_BLENDER")
+    if not executable:
+        sys.exit("Name a Blender executable: UMBRA_REAL_BLENDER=/path/to/blender")
+    with tempfile.TemporaryDirectory(prefix="umbra-end-to-end-") as temporary:
+        folder = Path(temporary)
+        blender = Blender(executable, folder / "resources")
+        print(blender.run("--version").splitlines()[0])
+        (zip_file,) = build([current_platform()], folder)
+        blender.run("--command", "extension", "install-file", "-r", "user_default", "-e", zip_file)
+
+        sky = make_sky()
+        write_exr(folder / "sky.exr", sky)
+        scene = folder / "scene.blend"
+        settings = {
+            "sky": str(folder / "sky.exr"),
+            "scene": str(scene),
+            "size": SIZE,
+            "rotation": ROTATION,
+            "strength": STRENGTH,
+            "ball_colour": BALL_COLOUR,
+        }
+        (folder / "settings.json").write_text(json.dumps(settings), encoding="utf-8")
+        blender.run("-b", "--python-exit-code", "1", "--python", SCENE_SCRIPT, "--", folder / "settings.json")
+        blender.run("-b", scene, "-a")
+        compare(folder, sky)
+
+        before = {path: path.stat().st_mtime_ns for path in folder.rglob("umbra_maps/*.exr")}
+        blender.run("-b", scene, "-f", "2")
+        if before != {path: path.stat().st_mtime_ns for path in folder.rglob("umbra_maps/*.exr")}:
+            sys.exit("Rendering again baked a map anew although nothing had changed.")
+
+        orthographic = "import bpy; bpy.context.scene.camera.data.type = 'ORTHO'"
+        output = blender.run("-b", scene, "--python-expr", orthographic, "-f", "1", status=1)
+        if "rthographic" not in output:
+            sys.exit(
+                f"{output}\nThe render failed, as it should, but did not say that the camera is orthographic."
+            )
+    print("End to end: passed.")
+
+
+if __name__ == "__main__":
+    main()
