@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .metric import horizon_radius
 from .rays import Array, Rays
-from .trapped import edge_function
+from .trapped import Barrier
 
 Mask = NDArray[np.bool_]
 
@@ -35,8 +35,9 @@ POLE_LIMIT = 1e-3
 # far above what error control leaves on rays that are well resolved, far below what a missed pole does.
 DRIFT_LIMIT = 1e4
 
-# Closest approach to the shadow's edge, as `edge_function` in multiples of the tolerance, that is trusted: the
-# amplification there is of the order of 1 / distance, so that errors of direction stay below some 1e-3 radians.
+# Closest approach to the critical curve that is trusted: |R(r_m)| over R''/2 r_m^2, which grows like the distance
+# from it, in multiples of the tolerance. Neighbouring rays part like 1 / distance, so that errors of direction stay
+# below some 1e-3 radians.
 EDGE_LIMIT = 1e4
 
 # The first step in zeta, as a share of the camera's radius.
@@ -46,7 +47,7 @@ FIRST_STEP = 0.02
 class PrintedSystem:
     """Rays from one camera towards the sky, as a `runge_kutta.System` in the affine parameter of Eq. 2."""
 
-    def __init__(self, rays: Rays, tolerance: float) -> None:
+    def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
         count = len(rays)
         observer = rays.observer
         state = np.empty((5, count))
@@ -63,7 +64,9 @@ class PrintedSystem:
         self._far = max(FAR_RADIUS, FAR_FACTOR * observer.r)
         self._horizon = horizon_radius(a)
         self._drift_limit = DRIFT_LIMIT * tolerance
-        self._critical = edge_function(rays) < EDGE_LIMIT * tolerance
+        passes = (rays.radial > 0.0) | (barrier.radius > observer.r)
+        margin = np.abs(barrier.height) / (barrier.curvature * barrier.radius**2)  # NaN without a barrier
+        self._critical = passes & (margin < EDGE_LIMIT * tolerance)
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d zeta along the backward ray to `out`; both (5, n).

@@ -78,7 +78,7 @@ class MinoSystem(ABC):
         self._spin = rays.spin
         # Rotation rate psi' = u (2 a - a^2 b u) / (1 - 2 u + a^2 u^2), for the backward ray with its sign turned.
         self._constants = np.vstack([unit, rays.carter, -2.0 * rays.spin * np.ones(len(rays)),
-                                     rays.spin**2 * rays.b, 1.0 / (np.sqrt(rays.carter + rays.spin**2) + 1.0),
+                                     rays.spin**2 * rays.b, 1.0 / (np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0)) + 1.0),
                                      rates])
         # A last step that ends short of infinity, or beyond, is corrected to first order; what that leaves is
         # of the order of the square of the distance.

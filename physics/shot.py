@@ -6,7 +6,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import warnings
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
-from .metric import check_spin, metric_functions
+from .metric import check_spin, isco_radius, metric_functions
 from .observer import Observer
 from .rays import Array
 from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, check_settings
@@ -183,7 +182,9 @@ def unstable_orbit_warning(parameters: WarpMapParameters) -> str | None:
     """Return a sentence when the camera's circular orbit is inside the ISCO, else None."""
     if parameters.motion not in ("circular", "circular_retrograde"):
         return None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        Observer.circular_orbit(parameters.spin, parameters.radius, prograde=parameters.motion == "circular")
-    return str(caught[0].message) if caught else None
+    isco = isco_radius(parameters.spin, prograde=parameters.motion == "circular")
+    if parameters.radius >= isco:
+        return None
+    return (
+        f"The circular orbit at {parameters.radius:.4g} M is unstable: the innermost stable one lies at {isco:.4g} M."
+    )

@@ -68,7 +68,7 @@ def _mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[
 
 
 def _printed_system(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
-    return [(np.arange(len(rays)), PrintedSystem(rays, tolerance))]
+    return [(np.arange(len(rays)), PrintedSystem(rays, barrier, tolerance))]
 
 
 METHODS = {

@@ -25,6 +25,10 @@ from .metric import check_spin, horizon_radius
 from .rays import Array, Rays
 
 
+# Newton's method at most doubles its digits: this many rounds serve any start.
+NEWTON_ROUNDS = 60
+
+
 @dataclass(frozen=True)
 class Barrier:
     """The outermost minimum of R(r) for each ray, shape (n,), NaN where R has none outside the horizon."""
@@ -35,6 +39,8 @@ class Barrier:
     """R(r_m), units of M^4: negative where light is turned back."""
     curvature: Array
     """R''(r_m) / 2, units of M^2, >= 0."""
+    reach: Array
+    """Y with R(r_cam) = R(r_m) + Y^2 and the sign of r_cam - r_m, units of M^2; 0 where R has no minimum."""
 
     @property
     def blocks(self) -> NDArray[np.bool_]:
@@ -43,7 +49,7 @@ class Barrier:
 
     def select(self, chosen: NDArray[np.intp]) -> Barrier:
         """Return the barriers of the chosen rays alone."""
-        return Barrier(self.radius[chosen], self.height[chosen], self.curvature[chosen])
+        return Barrier(self.radius[chosen], self.height[chosen], self.curvature[chosen], self.reach[chosen])
 
 
 def find_barrier(rays: Rays) -> Barrier:
@@ -62,7 +68,16 @@ def find_barrier(rays: Rays) -> Barrier:
         # R = r^4 + 2 A r^2 + 4 C r - a^2 q (Eq. 3 multiplied out)
         height = square * (square + 2.0 * linear) + 4.0 * constant * radius - a * a * rays.q
         curvature = np.maximum(6.0 * square + 2.0 * linear, 0.0)
-    return Barrier(radius, height, curvature)
+        # Taylor's series of R about r_m, whose first derivative vanishes.
+        offset = rays.observer.r - radius
+        reach_squared = offset * offset * (curvature + offset * (4.0 * radius + offset))
+        # Negative far inside, where R(r_cam) < R(r_m): nothing turns such rays, and Y plays no part.
+        reach = np.copysign(np.sqrt(np.where(reach_squared >= 0.0, reach_squared, np.nan)), offset)
+        # R(r_m) = R(r_cam) - Y^2 cancels less than the polynomial for a camera among the trapped orbits, where the
+        # critical curve is crossed with p_r near 0.
+        near = rays.radial**2 + reach * reach < square * square
+        height = np.where(near, (rays.radial - reach) * (rays.radial + reach), height)
+    return Barrier(radius, height, curvature, np.where(np.isnan(reach), 0.0, reach))
 
 
 def comes_from_sky(rays: Rays, barrier: Barrier | None = None) -> NDArray[np.bool_]:
@@ -82,19 +97,14 @@ def edge_function(rays: Rays) -> Array:
     Positive exactly for rays from the sky, negative for the shadow, zero on its edge, and smooth across it;
     a difference of radial direction cosines, of order 1.
 
-    Expanding R about its minimum, (Delta p_r)^2 = R(r_cam) = R(r_m) + Y^2 with
-    Y = (r_cam - r_m) sqrt(R''/2 + 4 r_m h + h^2), h = r_cam - r_m. Hence R(r_m) = (X - Y)(X + Y) with
-    X = Delta p_r, and the cases of `comes_from_sky` become the single condition Y - X > 0.
+    With X = Delta p_r, (Delta p_r)^2 = R(r_cam) = R(r_m) + Y^2 makes R(r_m) = (X - Y)(X + Y), and the cases of
+    `comes_from_sky` become the single condition Y - X > 0.
     """
-    barrier = find_barrier(rays)
-    offset = rays.observer.r - barrier.radius
+    r, a = rays.observer.r, rays.spin
     with np.errstate(invalid="ignore"):
-        squared = barrier.curvature + offset * (4.0 * barrier.radius + offset)
-        reach = np.where(np.isnan(offset), 0.0, offset * np.sqrt(np.maximum(squared, 0.0)))
         # P of Eq. 3 bounds |X|: divided by it, the function stays bounded however large b and q grow.
-        r, a = rays.observer.r, rays.spin
         bound = r * r + a * a - a * rays.b
-        return np.where(rays.escapes, (reach - rays.radial) / bound, -1.0)
+        return np.where(rays.escapes, (find_barrier(rays).reach - rays.radial) / bound, -1.0)
 
 
 def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
@@ -144,7 +154,7 @@ def trapped_impact_parameters(spin: float) -> tuple[float, float]:
 def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
     """Return q0(b), Carter's constant of the trapped orbit with impact parameter b (Eqs. 9, 11).
 
-    b0(r_0) = b is the cubic x^3 + (a^2 + a b - 3) x + 2 (a^2 - 1) = 0 in x = r_0 - 1, whose largest root is
+    b0(r_0) = b is the cubic x^3 + (a^2 + a b - 3) x + 2 (a^2 - 1) = 0 in x = r_0 - 1, whose positive root is
     wanted; Carter's constant follows from R'(r_0) = 0 rather than from Eq. 9, so that a = 0 needs no case.
 
     Parameters
@@ -168,10 +178,16 @@ def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
     low, high = trapped_impact_parameters(a)
     if np.any((b < low) | (b > high)):
         raise BlackHoleError(f"Trapped orbits have impact parameters between {low:.6g} and {high:.6g} only.")
-    third = np.sqrt(np.maximum((3.0 - a * a - a * b) / 3.0, 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.clip((1.0 - a * a) / third**3, -1.0, 1.0)
-    r = 1.0 + 2.0 * third * np.cos(np.arccos(np.where(third > 0.0, cosine, 1.0)) / 3.0)
+    linear, constant = a * a + a * b - 3.0, 2.0 * (a * a - 1.0)
+    # The constant is negative, so there is one positive root and the cubic is convex to its right: Newton's method
+    # from above the root comes down to it without leaving the right side of the asymptote r_0 = 1.
+    x = np.sqrt(np.maximum(-linear, 0.0)) + math.cbrt(-constant)
+    for _ in range(NEWTON_ROUNDS):
+        change = (x * (x * x + linear) + constant) / (3.0 * x * x + linear)
+        x = x - change
+        if np.all(np.abs(change) <= 2.0 * np.finfo(float).eps * x):
+            break
+    r = 1.0 + x
     # R = R' = 0 gives P(r) = 2 r Delta / (r - 1) and (b - a)^2 + q = P^2 / Delta = 4 r^2 Delta / (r - 1)^2.
     delta = r * r - 2.0 * r + a * a
-    return 4.0 * r * r * delta / (r - 1.0) ** 2 - (b - a) ** 2
+    return 4.0 * r * r * delta / (x * x) - (b - a) ** 2

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: ``python -m physics bake`` and ``python -m physics render``."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from .cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .errors import BlackHoleError
+from .exr import read_exr, write_exr
+from .png import write_png
+from .reference_render import render
+from .shot import MOTIONS, SUPERSAMPLING, WarpMapParameters, looking_at_hole, unstable_orbit_warning
+from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
+from .warp_map import bake
+from .warp_map_file import read_warp_map, write_warp_map
+
+# Motions as they are spelled on a command line; "velocity" has no short form there.
+ORBITS = {motion.replace("_", "-"): motion for motion in MOTIONS if motion != "velocity"}
+
+PICTURE_ENDINGS = (".png", ".exr")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status: 0 done, 1 a sentence on standard error, 2 wrong usage."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except BlackHoleError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\ncancelled: nothing was written", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m physics", description="Warp maps of a spinning black hole, without Blender."
+    )
+    commands = parser.add_subparsers(required=True, metavar="command")
+
+    baking = commands.add_parser(
+        "bake",
+        help="trace a warp map of a camera that looks at the hole",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    baking.set_defaults(run=_bake)
+    baking.add_argument("output", metavar="OUT.exr", type=Path)
+    baking.add_argument("--spin", type=float, default=0.9, help="spin of the hole, above -1 and below 1")
+    baking.add_argument("--radius", type=float, default=20.0, help="distance of the camera, in M")
+    baking.add_argument("--inclination", type=float, default=80.0, help="degrees from the spin axis, 0 to 180")
+    baking.add_argument("--azimuth", type=float, default=0.0, help="degrees about the spin axis")
+    baking.add_argument("--orbit", choices=tuple(ORBITS), default="fido", help="how the camera moves")
+    baking.add_argument("--width", type=int, default=1920, help="pixels of the picture")
+    baking.add_argument("--height", type=int, default=1080, help="pixels of the picture")
+    baking.add_argument("--fov", type=float, default=60.0, help="vertical field of view, degrees")
+    baking.add_argument("--panorama", action="store_true", help="the whole sky, equirectangular, instead of --fov")
+    baking.add_argument("--supersampling", type=int, choices=SUPERSAMPLING, default=1, help="map pixels per side")
+    baking.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="error of one step, radians")
+    baking.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
+
+    rendering = commands.add_parser(
+        "render",
+        help="make the picture of a warp map over an equirectangular sky",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    rendering.set_defaults(run=_render)
+    rendering.add_argument("map", metavar="MAP.exr", type=Path)
+    rendering.add_argument("sky", metavar="SKY.exr", type=Path)
+    rendering.add_argument("output", metavar="PICTURE.png|exr", type=Path)
+    rendering.add_argument(
+        "--rotation", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"), help="of the sky, degrees"
+    )
+    rendering.add_argument("--exposure", type=float, default=0.0, help="stops by which the sky is brightened")
+    rendering.add_argument("--redshift-colour", type=float, default=1.0, help="0 off, 1 physical")
+    rendering.add_argument("--redshift-brightness", type=float, default=1.0, help="0 off, 1 physical")
+    rendering.add_argument("--temperature", type=float, default=6500.0, help="of the sky's light, kelvin")
+    return parser
+
+
+def _bake(options: argparse.Namespace) -> None:
+    if options.output.suffix.lower() != ".exr":
+        raise BlackHoleError(f"{options.output} does not end in .exr; warp maps are OpenEXR files.")
+    if not 0.0 <= options.inclination <= 180.0:
+        raise BlackHoleError(f"The inclination is {options.inclination:g} degrees; give 0 to 180.")
+    camera: Camera
+    if options.panorama:
+        camera = PanoramaCamera(options.width, options.height)
+    else:
+        camera = PerspectiveCamera.from_field_of_view(options.width, options.height, math.radians(options.fov))
+    theta, phi = math.radians(options.inclination), math.radians(options.azimuth)
+    position = (
+        options.radius * math.sin(theta) * math.cos(phi),
+        options.radius * math.sin(theta) * math.sin(phi),
+        options.radius * math.cos(theta),
+    )
+    if not options.radius > 0.0:
+        raise BlackHoleError(f"The radius is {options.radius:g} M; it must be positive.")
+    parameters = WarpMapParameters(
+        spin=options.spin,
+        camera=camera,
+        camera_position=position,
+        camera_to_hole=looking_at_hole(position),
+        motion=ORBITS[options.orbit],
+        supersampling=options.supersampling,
+        tolerance=options.tolerance,
+        method=options.method,
+    )
+    parameters.validate()
+    warning = unstable_orbit_warning(parameters)
+    if warning:
+        print(f"note: {warning}", file=sys.stderr)
+    started = time.perf_counter()
+    warp_map = bake(parameters, progress=_ProgressPrinter())
+    write_warp_map(options.output, warp_map)
+    pixels = ", ".join(f"{count} {name}" for name, count in warp_map.counts.items())
+    print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels")
+    unresolved = warp_map.counts["unresolved"]
+    if unresolved:
+        print(f"note: {unresolved} pixels could not be resolved and will show magenta", file=sys.stderr)
+
+
+def _render(options: argparse.Namespace) -> None:
+    if options.output.suffix.lower() not in PICTURE_ENDINGS:
+        raise BlackHoleError(f"{options.output} must end in {' or '.join(PICTURE_ENDINGS)}.")
+    if not options.temperature > 0.0:
+        raise BlackHoleError(f"The temperature is {options.temperature:g} K; it must be positive.")
+    warp_map = read_warp_map(options.map)
+    camera = warp_map.metadata["parameters"]["camera"]
+    environment, _ = read_exr(options.sky)
+    if environment.shape[1] != 2 * environment.shape[0]:
+        print("note: the sky is not twice as wide as high; is it an equirectangular panorama?", file=sys.stderr)
+    picture = render(
+        warp_map,
+        environment,
+        rotation=[math.radians(angle) for angle in options.rotation],
+        colour_amount=options.redshift_colour,
+        brightness_amount=options.redshift_brightness,
+        temperature=options.temperature,
+        exposure=options.exposure,
+        output_size=(camera["width"], camera["height"]),
+    )
+    if options.output.suffix.lower() == ".png":
+        write_png(options.output, picture.image)
+    else:
+        write_exr(options.output, picture.image.astype("float32"))
+    print(f"wrote {options.output}")
+
+
+class _ProgressPrinter:
+    """Shows a fraction: as a line that is rewritten on a terminal, at every tenth elsewhere."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._shown = -1
+
+    def __call__(self, fraction: float) -> None:
+        percent = int(100.0 * fraction)
+        if not self._terminal:
+            percent -= percent % 10
+        if percent == self._shown:
+            return
+        self._shown = percent
+        end = "\n" if percent >= 100 or not self._terminal else ""
+        start = "\r" if self._terminal else ""
+        print(f"{start}tracing {percent} %", end=end, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
