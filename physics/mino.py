@@ -203,22 +203,21 @@ class TurningRays(MinoSystem):
 class DirectRays(MinoSystem):
     """Rays that go from the camera straight out, with nothing to turn them: u = u_c (1 - x).
 
-    The centre u_c is the camera, or, for a camera inside a barrier that does not turn the ray, the top of the
-    barrier: next to the critical curve U almost vanishes there, and expanded about it keeps its digits.
+    The centre u_c is the camera, or, for a camera inside a barrier that does not turn the ray, the barrier: next to the critical curve U almost vanishes there, and expanded about it keeps its digits.
     """
 
     def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
         r = rays.observer.r
-        ahead = barrier.radius > r  # False where there is no barrier
+        ahead = barrier.radius > r
         unit = 1.0 / np.where(ahead, barrier.radius, r)
         square = unit * unit
         c2, c3, c4 = radial_polynomial(rays)
-        # U(u_c (1 - x)) / u_c^2 as a polynomial in x. U = u^4 R, so that U' = 4 u^3 R where R' vanishes.
+        # U(u_c (1 - x)) / u_c^2 as a polynomial in x. U = u^4 R, hence U' = 4 u^3 R - u^2 R'.
         rates = np.stack([
             square * np.where(ahead, barrier.height, rays.radial**2),
             np.where(
                 ahead,
-                -4.0 * square * barrier.height,
+                unit * barrier.slope - 4.0 * square * barrier.height,
                 -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
             ),
             c2 + 3.0 * c3 * unit + 6.0 * c4 * square,

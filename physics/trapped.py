@@ -31,53 +31,67 @@ NEWTON_ROUNDS = 60
 
 @dataclass(frozen=True)
 class Barrier:
-    """The outermost minimum of R(r) for each ray, shape (n,), NaN where R has none outside the horizon."""
+    """The outermost minimum of R(r) for each ray, shape (n,).
+
+    Where R has no minimum outside r = 1, the place where it comes nearest to one stands in: the inflection of R',
+    or r = 1, which always lies between the horizons. R is positive there, so nothing is blocked by it, and
+    all of these numbers are continuous from one ray to the next.
+    """
 
     radius: Array
     """r_m, units of M."""
     height: Array
     """R(r_m), units of M^4: negative where light is turned back."""
+    slope: Array
+    """R'(r_m), units of M^3: 0 at a minimum, positive where something stands in for it."""
     curvature: Array
     """R''(r_m) / 2, units of M^2, >= 0."""
     reach: Array
-    """Y with R(r_cam) = R(r_m) + Y^2 and the sign of r_cam - r_m, units of M^2; 0 where R has no minimum."""
-
-    @property
-    def blocks(self) -> NDArray[np.bool_]:
-        """Whether the barrier turns rays back."""
-        return self.height < 0.0  # NaN: False
+    """Y with R(r_cam) = R(r_m) + Y^2 and the sign of r_cam - r_m, units of M^2."""
+    blocks: NDArray[np.bool_]
+    """Whether the barrier turns rays back."""
 
     def select(self, chosen: NDArray[np.intp]) -> Barrier:
         """Return the barriers of the chosen rays alone."""
-        return Barrier(self.radius[chosen], self.height[chosen], self.curvature[chosen], self.reach[chosen])
+        return Barrier(
+            self.radius[chosen],
+            self.height[chosen],
+            self.slope[chosen],
+            self.curvature[chosen],
+            self.reach[chosen],
+            self.blocks[chosen],
+        )
 
 
 def find_barrier(rays: Rays) -> Barrier:
     """Return the outermost minimum of Eq. 3's R for each ray, in closed form."""
-    a = rays.spin
+    a, r_cam = rays.spin, rays.observer.r
     linear = 0.5 * (a * a - rays.carter)  # A
     constant = 0.5 * (rays.carter + a * a - 2.0 * a * rays.b)  # C
+    third = np.sqrt(np.maximum(-linear, 0.0) / 3.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        exists = (linear < 0.0) & (4.0 * linear**3 + 27.0 * constant**2 <= 0.0)
-        third = np.sqrt(np.where(exists, -linear, np.nan) / 3.0)
+        # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3); below -1 there is no minimum, and the formula, held at
+        # -1, gives the inflection of R', sqrt(-A/3).
         cosine = np.clip(-0.5 * constant / third**3, -1.0, 1.0)
-        # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3)
-        radius = 2.0 * third * np.cos(np.arccos(cosine) / 3.0)
-        radius = np.where(radius > horizon_radius(a), radius, np.nan)
-        square = radius * radius
-        # R = r^4 + 2 A r^2 + 4 C r - a^2 q (Eq. 3 multiplied out)
-        height = square * (square + 2.0 * linear) + 4.0 * constant * radius - a * a * rays.q
-        curvature = np.maximum(6.0 * square + 2.0 * linear, 0.0)
-        # Taylor's series of R about r_m, whose first derivative vanishes.
-        offset = rays.observer.r - radius
-        reach_squared = offset * offset * (curvature + offset * (4.0 * radius + offset))
-        # Negative far inside, where R(r_cam) < R(r_m): nothing turns such rays, and Y plays no part.
-        reach = np.copysign(np.sqrt(np.where(reach_squared >= 0.0, reach_squared, np.nan)), offset)
-        # R(r_m) = R(r_cam) - Y^2 cancels less than the polynomial for a camera among the trapped orbits, where the
-        # critical curve is crossed with p_r near 0.
-        near = rays.radial**2 + reach * reach < square * square
-        height = np.where(near, (rays.radial - reach) * (rays.radial + reach), height)
-    return Barrier(radius, height, curvature, np.where(np.isnan(reach), 0.0, reach))
+        minimum = 2.0 * third * np.cos(np.arccos(cosine) / 3.0)
+    radius = np.where(minimum > 1.0, minimum, 1.0)  # also where third = 0 made it NaN
+    exists = (4.0 * linear**3 + 27.0 * constant**2 <= 0.0) & (minimum > 1.0)
+    square = radius * radius
+    # R = r^4 + 2 A r^2 + 4 C r - a^2 q (Eq. 3 multiplied out) and its derivatives
+    height = square * (square + 2.0 * linear) + 4.0 * constant * radius - a * a * rays.q
+    slope = np.where(exists, 0.0, np.maximum(4.0 * (radius * (square + linear) + constant), 0.0))
+    curvature = np.maximum(6.0 * square + 2.0 * linear, 0.0)
+    # Taylor's series of R about r_m. It is negative far inside, where R(r_cam) < R(r_m): nothing turns such rays,
+    # and Y plays no part.
+    offset = r_cam - radius
+    reach_squared = offset * (slope + offset * (curvature + offset * (4.0 * radius + offset)))
+    reach = np.copysign(np.sqrt(np.maximum(reach_squared, 0.0)), offset)
+    # R(r_m) = R(r_cam) - Y^2 cancels less than the polynomial for a camera among the trapped orbits, where the
+    # critical curve is crossed with p_r near 0.
+    near = (reach_squared >= 0.0) & (rays.radial**2 + reach_squared < square * square)
+    height = np.where(near, (rays.radial - reach) * (rays.radial + reach), height)
+    blocks = (height < 0.0) & exists & (radius > horizon_radius(a))
+    return Barrier(radius, height, slope, curvature, reach, blocks)
 
 
 def comes_from_sky(rays: Rays, barrier: Barrier | None = None) -> NDArray[np.bool_]:
