@@ -9,8 +9,8 @@ from . import handlers, operators, panels, properties
 
 _CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
-# What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then fails
-# loudly, so that it can be tried again.
+# What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
+# fails loudly, so that it can be tried again.
 _undo: list[Callable[[], None]] = []
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bake warp maps: the work is a generator, drained where Blender has no window and stepped by a timer where it has.
+"""Bake warp maps: a generator does the work, drained without a window and stepped by a timer in one.
 
 A generator is resumed from Blender's event loop, where undo or a newly loaded file may have replaced every
 datablock since the last time. So it holds names, and looks the scene up each time.
@@ -11,8 +11,9 @@ from pathlib import Path
 
 import bpy
 
-from . import compositing, maps, shot
+from . import maps, shot, sync
 from ._physics import physics
+from .compositor_tree import find_setup
 from .errors import SceneError
 
 
@@ -135,13 +136,13 @@ def bake_frames(
 def finish(scene_name: str) -> None:
     """Let the compositor see new maps."""
     scene = bpy.data.scenes.get(scene_name)
-    if scene is not None and compositing.find_setup(scene) is not None:
-        compositing.refresh(scene)
-        compositing.forget_loaded_map(scene)
+    if scene is not None and find_setup(scene) is not None:
+        sync.refresh(scene)
+        sync.forget_loaded_map(scene)
 
 
 def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) -> Summary:
-    """Run a bake to its end; with `announce`, its progress is printed, at most once for each tenth of the work."""
+    """Run a bake to its end; with `announce`, each tenth of the work is printed."""
     told = -1
     while True:
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sky around the hole: read from the scene's World, taken from an image, or the built-in sky of real stars."""
+"""The sky around the hole: the World's, an image, or the built-in sky of real stars."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,8 +59,8 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
         origin = _source(mapping.inputs["Vector"])
     if origin is None or origin.node.type != "TEX_COORD" or origin.name != "Generated":
         raise SceneError(
-            "The World's Environment Texture takes its coordinates from something else than Texture Coordinate > "
-            f"Generated, with or without a Mapping node: {_HELP}."
+            "The World's Environment Texture takes its coordinates from something else than Texture "
+            f"Coordinate > Generated, with or without a Mapping node: {_HELP}."
         )
     if mapping is None:
         return (0.0, 0.0, 0.0), None
@@ -70,14 +70,11 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
             f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}."
         )
     has_location = mapping.vector_type in {"POINT", "TEXTURE"}
-    if (
-        (has_location
-        and any(inputs["Location"].default_value))
-        or tuple(inputs["Scale"].default_value) != (1, 1, 1)
-    ):
+    moves = has_location and any(inputs["Location"].default_value)
+    if moves or tuple(inputs["Scale"].default_value) != (1.0, 1.0, 1.0):
         raise SceneError(
-            "The World's Mapping node moves or scales the sky: only its Rotation can be taken over; set Location to "
-            "0 and Scale to 1."
+            "The World's Mapping node moves or scales the sky: only its Rotation can be taken over; set "
+            "Location to 0 and Scale to 1."
         )
     rotation = Euler(inputs["Rotation"].default_value, "XYZ")
     if mapping.vector_type == "TEXTURE":
@@ -114,21 +111,21 @@ def read_world(scene: bpy.types.Scene) -> Sky:
         raise SceneError(f'World "{world.name}" is a plain colour and has no environment: {_HELP}.')
     if colour.node.type != "TEX_ENVIRONMENT":
         raise SceneError(
-            f'World "{world.name}" makes its colour with the node "{colour.node.name}", which cannot be taken over: '
-            f"{_HELP}."
+            f'World "{world.name}" makes its colour with the node "{colour.node.name}", which cannot be '
+            f"taken over: {_HELP}."
         )
     if background.inputs["Strength"].is_linked:
         raise SceneError(
-            f'The strength of World "{world.name}" is driven by other nodes, which cannot be followed: set it as a '
-            "number."
+            f'The strength of World "{world.name}" is driven by other nodes, which cannot be followed: set '
+            "it as a number."
         )
     texture = colour.node
     if texture.image is None:
         raise SceneError(f'The Environment Texture of World "{world.name}" has no image: choose one.')
     if texture.projection != "EQUIRECTANGULAR":
         raise SceneError(
-            f'The Environment Texture of World "{world.name}" is a mirror ball: only Equirectangular images can be '
-            "taken over."
+            f'The Environment Texture of World "{world.name}" is a mirror ball: only Equirectangular images '
+            "can be taken over."
         )
     rotation, rotation_path = _mapping(texture)
     return Sky(
@@ -205,4 +202,5 @@ def load_star_sky() -> bpy.types.Image:
     image = bpy.data.images.load(str(path))
     image.name = STAR_SKY_NAME
     image.pack()
+    image.filepath_raw = f"//{_STAR_SKY_FILE}"  # no path of this computer in a file that may be passed on
     return image

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bake what is missing when Blender renders, and never let a wrong picture pass for a right one.
 
-For each frame Blender calls render_pre, then frame_change_post with the render's own dependency graph, in which
+For each frame Blender calls render_pre, then frame_change_post with the render's own dependency graph, where
 animation, constraints and the camera of this frame are evaluated; then it renders and runs the compositor. So
 render_pre takes the map away (the picture is magenta now), and only frame_change_post gives a valid one back.
 render_post comes before the picture is written, and sees whether that happened.
@@ -9,13 +9,15 @@ render_post comes before the picture is written, and sees whether that happened.
 
 import atexit
 from collections.abc import Callable
+from pathlib import Path
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, compositing, maps, messages, node_group, shot
+from . import baking, maps, messages, node_group, shot, sync
 from ._physics import physics
-from .errors import SceneError
+from .compositor_tree import find_setup, is_in_use
+from .errors import MapFolderError, SceneError
 
 # Scenes whose current frame is being rendered and has no valid map yet, by name.
 _waiting: dict[str, str] = {}
@@ -44,7 +46,7 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
     if bpy.app.background:
         _restore_device(scene)
         messages.end_process(text)
-    compositing.point_at_nothing(scene)
+    sync.point_at_nothing(scene)
     messages.warn(text)
     if scene.name not in _told:
         _told.add(scene.name)
@@ -58,22 +60,22 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
 def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     _told.discard(scene.name)
-    if not compositing.is_in_use(scene):
+    if not is_in_use(scene):
         return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
-        # without a display there is usually no OpenGL, and Blender's GPU compositor ends the process without it
+        # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
-    _guarded(compositing.sync_sky, scene)
+    _guarded(sync.sync_sky, scene)
 
 
 @persistent
 def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A frame begins."""
-    if not compositing.is_in_use(scene):
+    if not is_in_use(scene):
         return
     _waiting[scene.name] = _NOT_EVALUATED
-    _guarded(compositing.point_at_nothing, scene)
+    _guarded(sync.point_at_nothing, scene)
 
 
 @persistent
@@ -97,7 +99,7 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The render is complete or cancelled."""
     _waiting.pop(scene.name, None)
     _restore_device(scene)
-    compositing.refresh(scene)
+    sync.refresh(scene)
 
 
 def _restore_device(scene: bpy.types.Scene) -> None:
@@ -119,13 +121,13 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     if not maps.is_fresh(path, parameters):
         if not scene.umbra.auto_bake:
             raise SceneError(
-                f"The warp map of frame {frame_shot.frame} is missing or out of date: bake it, or switch on Bake When "
-                "Rendering in the Umbra panel."
+                f"The warp map of frame {frame_shot.frame} is missing or out of date: bake it, or switch on "
+                "Bake When Rendering in the Umbra panel."
             )
         print(f"Umbra: baking the warp map of frame {frame_shot.frame}", flush=True)
         for _fraction in baking.bake_map(path, parameters):
             pass
-    compositing.point_at_maps(scene)
+    sync.point_at_maps(scene)
     del _waiting[scene.name]
 
 
@@ -138,18 +140,26 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     _waiting.clear()
     _devices.clear()
     for scene in bpy.data.scenes:
-        setup = compositing.find_setup(scene)
+        setup = find_setup(scene)
         if setup is not None and setup.group.library is None:
             setup.group.node_tree = node_group.ensure_group()
-            compositing.refresh(scene)
+            sync.refresh(scene)
 
 
 @persistent
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     for scene in bpy.data.scenes:
-        if compositing.find_setup(scene) is not None:
-            compositing.refresh(scene)
+        if find_setup(scene) is None:
+            continue
+        sync.refresh(scene)
+        try:
+            folder = maps.adopt(scene, Path(path)) if path and not bpy.data.filepath else None
+        except MapFolderError as error:
+            messages.warn(str(error))
+            continue
+        if folder is not None:
+            sync.move_map_path(scene, folder)
 
 
 # --- registration ---------------------------------------------------------------------------------

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where warp maps lie, and whether they still hold.
 
-A map's name tells scene, hole, size and frame, so that a test at half the resolution loses nothing that was baked.
-Blender reads the maps as an image sequence. The sequence is cyclic with a length of a million, because that is how
-one fixed setting maps every frame to a number of its own, negative frames too (file names have no minus signs):
-frame f is file f, and frame -5 is file 999995.
+A map's name tells scene, hole, size and frame, so that a test at half the resolution loses nothing that was
+baked. Blender reads the maps as an image sequence. The sequence is cyclic with a length of a million, because
+that is how one fixed setting gives every frame a number of its own, negative frames too (file names have no
+minus signs): frame f is file f, and frame -5 is file 999995.
 """
 
 import errno
@@ -39,7 +39,7 @@ class MapFolder:
 
 
 def folder(scene: bpy.types.Scene) -> MapFolder:
-    """The folder of a scene's maps; a temporary one where it should be beside a file that is not saved yet."""
+    """The folder of a scene's maps; a temporary one if it should be beside a file not saved yet."""
     chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
     if chosen.startswith("//") and not bpy.data.filepath:
         path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
@@ -63,8 +63,8 @@ def file_name(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], fra
     """
     if not FIRST_FRAME <= frame <= LAST_FRAME:
         raise SceneError(
-            f"Frame {frame} is outside {FIRST_FRAME} to {LAST_FRAME}, the frames that warp maps can be numbered by: "
-            "move the animation."
+            f"Frame {frame} is outside {FIRST_FRAME} to {LAST_FRAME}, the frames that warp maps can be "
+            "numbered by: move the animation."
         )
     return f"{stem(scene, hole_name, size)}{frame % SEQUENCE_LENGTH:04d}.exr"
 
@@ -75,12 +75,12 @@ def map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], fram
 
 
 def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
-    """The same path as an image datablock should carry it: relative to the .blend file where that is saved."""
+    """The same path as Blender's data should carry it: relative to the .blend file once that is saved."""
     return folder(scene).blender_path + file_name(scene, hole_name, size, frame)
 
 
 def is_fresh(path: Path, parameters: "physics.WarpMapParameters") -> bool:
-    """Whether a map exists and was made by exactly these parameters. A damaged or foreign file is not fresh."""
+    """Whether a map exists and was made by exactly these parameters; a damaged or foreign one is not."""
     if not path.is_file():
         return False
     try:
@@ -126,8 +126,8 @@ def prepare(path: Path, size: tuple[int, int]) -> None:
     needed = size[0] * size[1] * BYTES_PER_PIXEL
     if free < needed:
         raise MapFolderError(
-            f"The disk of the warp map folder {parent} is full: {free / 1e6:.0f} MB are free, a map needs up to "
-            f"{needed / 1e6:.0f} MB; free some space or choose another folder."
+            f"The disk of the warp map folder {parent} is full: {free / 1e6:.0f} MB are free, a map needs up "
+            f"to {needed / 1e6:.0f} MB; free some space or choose another folder."
         )
 
 
@@ -139,27 +139,49 @@ def explain(error: OSError, place: Path) -> MapFolderError:
         )
     reason = error.strerror or str(error)
     return MapFolderError(
-        f"The warp map folder {place} cannot be written to ({reason}): choose another folder in the Umbra panel, or "
-        "change its permissions."
+        f"The warp map folder {place} cannot be written to ({reason}): choose another folder in the Umbra "
+        "panel, or change its permissions."
     )
 
 
-def adopt(source: Path, target: Path) -> int:
-    """Copy maps from a temporary folder to the folder beside the file, once it has been saved.
+def adopt(scene: bpy.types.Scene, blend_file: Path) -> str | None:
+    """Bring a scene's maps from the temporary folder beside a file that is being saved for the first time.
 
-    Maps that are there already are kept. Returns the number of maps copied.
+    Maps that are there already are kept.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its maps are looked for.
+    blend_file : Path
+        Where the file will be.
+
+    Returns
+    -------
+    str or None
+        The folder as Blender's data should refer to it; None if the scene's folder is not a temporary one.
+
+    Raises
+    ------
+    MapFolderError
+        The folder cannot be written to.
     """
-    copied = 0
-    for path in sorted(source.glob("*.exr")):
-        destination = target / path.name
-        if destination.exists():
-            continue
-        target.mkdir(parents=True, exist_ok=True)
-        partial = destination.with_name(f".{destination.name}.part")
-        shutil.copyfile(path, partial)
-        os.replace(partial, destination)
-        copied += 1
-    return copied
+    source = folder(scene)
+    if not source.is_temporary:
+        return None
+    blender_path = (scene.umbra.map_folder.strip() or DEFAULT_FOLDER).rstrip("/\\") + "/"
+    target = blend_file.parent / blender_path.removeprefix("//")
+    try:
+        for path in sorted(source.path.glob(f"{bpy.path.clean_name(scene.name)}_*.exr")):
+            destination = target / path.name
+            if not destination.exists():
+                target.mkdir(parents=True, exist_ok=True)
+                partial = destination.with_name(f".{destination.name}.part")
+                shutil.copyfile(path, partial)
+                os.replace(partial, destination)
+    except OSError as error:
+        raise explain(error, target) from error
+    return blender_path
 
 
 def frames_of(scene: bpy.types.Scene) -> range:

@@ -6,9 +6,11 @@ from functools import wraps
 
 import bpy
 
-from . import baking, compositing, environment, maps, shot
+from . import baking, compositing, environment, maps, shot, sync
 from ._physics import physics
+from .compositor_tree import find_setup
 from .errors import SceneError
+from .properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
 
 TIMER_INTERVAL = 0.02  # seconds between steps of a bake that runs beside the interface
 
@@ -44,9 +46,9 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
     bl_description = "Add a black hole at the 3D cursor and set up the scene to render it"
     bl_options = {"REGISTER", "UNDO"}
 
-    spin: bpy.props.FloatProperty(name="Spin", default=0.9, min=0.0, max=0.9999, precision=4)
+    spin: bpy.props.FloatProperty(name="Spin", default=0.9, min=0.0, max=LARGEST_SPIN, precision=4)
     mass_scale: bpy.props.FloatProperty(
-        name="Size of 1 M", default=0.25, min=1e-9, soft_min=0.001, precision=4, unit="LENGTH"
+        name="Size of 1 M", default=DEFAULT_MASS_SCALE, min=1e-9, soft_min=0.001, precision=4, unit="LENGTH"
     )
 
     @classmethod
@@ -105,7 +107,7 @@ class UMBRA_OT_make_active(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.scene.umbra.active_hole = context.object
-        compositing.refresh(context.scene)
+        sync.refresh(context.scene)
         return {"FINISHED"}
 
 
@@ -113,8 +115,8 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
     bl_idname = "umbra.setup_compositor"
     bl_label = "Set Up Compositor"
     bl_description = (
-        "Put the black hole and its sky behind the render. Your own nodes stay; running it again brings the set-up "
-        "up to date"
+        "Put the black hole and its sky behind the render. Your own nodes stay; running it again brings the "
+        "set-up up to date"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -134,7 +136,7 @@ class UMBRA_OT_remove_compositor(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return compositing.find_setup(context.scene) is not None or compositing.BEFORE in context.scene
+        return find_setup(context.scene) is not None or compositing.BEFORE in context.scene
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -259,7 +261,7 @@ class BakeOperator:
         if summary.unresolved:
             self.report(
                 {"WARNING"},
-                f"{summary.unresolved} rays could not be resolved; the Regularised method resolves every ray.",
+                f"{summary.unresolved} rays could not be resolved; the Regularised method resolves ray.",
             )
 
 

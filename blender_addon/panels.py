@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Umbra panel in the 3D viewport's sidebar, and the hole's settings in Object Properties. It only draws."""
+"""The panel in the 3D viewport's sidebar, and the hole's settings in Object Properties. It only draws."""
 
 import bpy
 
-from . import compositing, operators, shot, status
+from . import operators, shot, status
+from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
 
 LOOK_CONTROLS = ("Exposure", "Redshift Colour", "Redshift Brightness", "Sky Temperature")
@@ -58,7 +59,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
             return
         if hole is None:
             return
-        if compositing.find_setup(scene) is None:
+        if find_setup(scene) is None:
             layout.operator("umbra.setup_compositor", icon="NODE_COMPOSITING")
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")
@@ -84,7 +85,7 @@ class VIEW3D_PT_umbra_sky(_Panel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return compositing.find_setup(context.scene) is not None
+        return find_setup(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -98,7 +99,7 @@ class VIEW3D_PT_umbra_sky(_Panel, bpy.types.Panel):
         problem = status.sky_problem(context.scene)
         if problem is not None:
             _draw_lines(layout, status.wrapped(problem, "ERROR"))
-        group = compositing.find_setup(context.scene).group
+        group = find_setup(context.scene).group
         column = layout.column()
         column.active = settings.environment_source == "IMAGE"
         _draw_inputs(column, group, PLACEMENT_CONTROLS)
@@ -128,7 +129,7 @@ class VIEW3D_PT_umbra_maps(_Panel, bpy.types.Panel):
         if settings.quality == "CUSTOM":
             layout.prop(settings, "tolerance")
         layout.prop(settings, "method")
-        if compositing.find_setup(context.scene) is not None:
+        if find_setup(context.scene) is not None:
             layout.operator("umbra.setup_compositor", text="Update Compositor", icon="FILE_REFRESH")
             layout.operator("umbra.remove_compositor", icon="X")
 

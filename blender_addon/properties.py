@@ -8,6 +8,9 @@ from ._physics import metric, physics
 # physics accepts spins up to this; a hole spinning the other way is the object turned over.
 LARGEST_SPIN = 0.9999
 
+# With Blender's default camera, the shadow then fills most of the picture's height.
+DEFAULT_MASS_SCALE = 0.35
+
 # Blender draws Empties no smaller (scene units).
 SMALLEST_DISPLAY = 1e-4
 
@@ -35,8 +38,12 @@ METHOD_LABELS = {
 }
 
 
-def _show_horizon(settings: "UmbraHoleProperties", _context: object) -> None:
-    """Draw the Empty's sphere at the size of the horizon."""
+def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
+    """Draw the Empty's sphere at the size of the horizon.
+
+    Every property has this as its update function, also where the sphere stays the same: without one, Blender
+    does not carry a script's new value into evaluated data.
+    """
     hole = settings.id_data
     if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
         hole.empty_display_size = max(
@@ -51,7 +58,7 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
         name="Black Hole",
         description="This object is a black hole: its origin is the centre, its local Z the axis of rotation",
         default=False,
-        update=_show_horizon,
+        update=_changed,
         options=set(),
     )
     spin: bpy.props.FloatProperty(
@@ -63,19 +70,19 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
         max=LARGEST_SPIN,
         precision=4,
         step=1,
-        update=_show_horizon,
+        update=_changed,
     )
     mass_scale: bpy.props.FloatProperty(
         name="Size of 1 M",
         description="Length of one gravitational radius (G M / c^2) in scene units, before the object's own "
         "scale. The shadow is about ten of these across",
-        default=0.25,
+        default=DEFAULT_MASS_SCALE,
         min=1e-9,
         soft_min=0.001,
         soft_max=100.0,
         precision=4,
         unit="LENGTH",
-        update=_show_horizon,
+        update=_changed,
     )
     motion: bpy.props.EnumProperty(
         name="Camera Motion",
@@ -106,15 +113,17 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
             ),
         ),
         default="FIDO",
+        update=_changed,
     )
     speed_of_light: bpy.props.FloatProperty(
         name="Speed of Light",
-        description="Scene units that light covers in a second; the camera's animation is measured against it",
+        description="Scene units that light covers in a second; the camera's speed is measured against it",
         default=100.0,
         min=1e-6,
         soft_min=0.1,
         soft_max=1e5,
         precision=3,
+        update=_changed,
     )
 
 
@@ -141,8 +150,8 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     supersampling: bpy.props.EnumProperty(
         name="Samples",
-        description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples smooth "
-        "the finest images of the sky beside it",
+        description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples "
+        "smooth the finest images of the sky beside it",
         items=(
             ("1", "1 x 1", "One ray a pixel"),
             ("2", "2 x 2", "Four rays a pixel"),
@@ -206,8 +215,8 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     auto_bake: bpy.props.BoolProperty(
         name="Bake When Rendering",
-        description="Rendering bakes by itself each warp map that is missing or out of date. Switched off, such a "
-        "frame is an error",
+        description="Rendering bakes by itself each warp map that is missing or out of date. Switched off, "
+        "such a frame is an error",
         default=True,
         options=set(),
     )
@@ -215,11 +224,11 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 def _refresh(settings: UmbraSceneProperties) -> None:
     """Carry a change of the sky into the compositor, where the set-up is in place."""
-    from . import compositing  # compositing reads these properties, hence not at the top
+    from . import sync  # it reads these properties, hence not at the top
 
     scene = settings.id_data
-    if isinstance(scene, bpy.types.Scene) and compositing.find_setup(scene) is not None:
-        compositing.refresh(scene)
+    if isinstance(scene, bpy.types.Scene) and sync.find_setup(scene) is not None:
+        sync.refresh(scene)
 
 
 def tolerance_of(settings: UmbraSceneProperties) -> float:

@@ -17,7 +17,8 @@ from ._physics import physics
 from .errors import SceneError
 from .properties import CAMERA_ANIMATION, MOTIONS, tolerance_of
 
-# Object matrices are float32: axes may differ in length, and from right angles, by so much for rounding alone.
+# Object matrices are float32: axes may differ in length, and from right angles, by so much from
+# rounding.
 MATRIX_TOLERANCE = 1e-4
 
 Vector = NDArray[np.float64]
@@ -83,12 +84,14 @@ def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
     chosen = scene.umbra.active_hole
     if chosen is not None:
         raise SceneError(
-            f'The black hole "{chosen.name}" is no longer in scene "{scene.name}": choose another one in the Umbra '
-            "panel, add one with Add > Black Hole, or take the compositor set-up out with Remove from Compositor."
+            f'The black hole "{chosen.name}" is no longer in scene "{scene.name}": choose another one in the '
+            "Umbra panel, add one with Add > Black Hole, or take the compositor set-up out with Remove from "
+            "Compositor."
         )
     if holes(scene):
         raise SceneError(
-            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is rendered.'
+            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is '
+            "rendered."
         )
     raise SceneError(
         f'Scene "{scene.name}" contains no black hole: add one with Add > Black Hole, or take the compositor '
@@ -102,14 +105,14 @@ def _check_evaluated(hole: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     if hole.hide_render if rendering else hole.hide_viewport:
         where = "renders" if rendering else "viewports"
         raise SceneError(
-            f'The black hole "{hole.name}" is disabled in {where}, so Blender does not move it: enable it in the '
-            "Outliner, or take the compositor set-up out with Remove from Compositor."
+            f'The black hole "{hole.name}" is disabled in {where}, so Blender does not move it: enable it in '
+            "the Outliner, or take the compositor set-up out with Remove from Compositor."
         )
     layer = depsgraph.view_layer
     if layer.objects.get(hole.name) is None:
         raise SceneError(
-            f'The black hole "{hole.name}" is in a collection that view layer "{layer.name}" excludes, so Blender '
-            "does not move it: include that collection."
+            f'The black hole "{hole.name}" is in a collection that view layer "{layer.name}" excludes, so '
+            "Blender does not move it: include that collection."
         )
 
 
@@ -147,7 +150,8 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
     axes = matrix[:3, :3] / lengths
     if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
         raise SceneError(
-            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.'
+            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale '
+            "uniform."
         )
     if np.linalg.det(axes) < 0.0:
         raise SceneError(
@@ -213,13 +217,13 @@ def check_render(render: bpy.types.RenderSettings) -> None:
     """
     if render.use_border and render.use_crop_to_border:
         raise SceneError(
-            "Crop to Render Region is not supported with a black hole: switch it off in Output Properties > Format "
-            "(the render region itself works)."
+            "Crop to Render Region is not supported with a black hole: switch it off in Output Properties > "
+            "Format (the render region itself works)."
         )
     if render.use_multiview:
         raise SceneError(
-            "Stereoscopy is not supported with a black hole: switch it off in Output Properties, or render each "
-            "eye as a camera of its own."
+            "Stereoscopy is not supported with a black hole: switch it off in Output Properties, or render "
+            "each eye as a camera of its own."
         )
 
 
@@ -262,8 +266,8 @@ def camera_model(
             )
         if engine != "CYCLES":
             raise SceneError(
-                f'Camera "{camera.name}" is a panorama, which only Cycles renders: choose Cycles, or a perspective '
-                "camera."
+                f'Camera "{camera.name}" is a panorama, which only Cycles renders: choose Cycles, or a '
+                "perspective camera."
             )
         limits = ("latitude_min", "latitude_max", "longitude_min", "longitude_max")
         return physics.PanoramaCamera(
@@ -271,8 +275,8 @@ def camera_model(
         )
     if camera.type == "ORTHO":
         raise SceneError(
-            f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the camera '
-            "perspective."
+            f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the '
+            "camera perspective."
         )
     raise SceneError(
         f'Camera "{camera.name}" is of type {camera.type.title()}, which cannot show a black hole: make it '
@@ -297,8 +301,8 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     depsgraph : Depsgraph
         Evaluated at the frame; of a render, or of a viewport.
     velocity : array, shape (3,), optional
-        The camera's velocity, scene units a second, world axes, for the motion Camera Animation. Without it, it
-        is measured, which steps the scene half a frame back and forth.
+        The camera's velocity, scene units a second, world axes, for the motion Camera Animation. Without it,
+        it is measured, which steps the scene half a frame back and forth.
 
     Raises
     ------
@@ -330,9 +334,9 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         speed = world_to_hole @ velocity / hole_settings.speed_of_light
         if np.linalg.norm(speed) >= 1.0:
             raise SceneError(
-                f'Frame {scene.frame_current}: camera "{camera.name}" moves at {np.linalg.norm(speed):.3g} times the '
-                "speed of light; slow its animation down, or raise the black hole's Speed of Light above "
-                f"{np.linalg.norm(velocity):.4g} scene units a second."
+                f'Frame {scene.frame_current}: camera "{camera.name}" moves at {np.linalg.norm(speed):.3g} '
+                "times the speed of light; slow its animation down, or raise the black hole's Speed of Light "
+                f"above {np.linalg.norm(velocity):.4g} scene units a second."
             )
 
     settings = scene.umbra

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel says about a scene: read from Blender and from the maps' headers, cheap enough for drawing."""
+"""What the panel says about a scene, from Blender and the maps' headers: cheap enough for drawing."""
 
 import textwrap
 import time
@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import baking, compositing, environment, maps, shot
+from . import baking, environment, maps, shot
 from ._physics import metric, physics
+from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
 
 LINE_WIDTH = 44  # characters that a sidebar of ordinary width shows
@@ -53,7 +54,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     except physics.BlackHoleError as error:
         return wrapped(str(error), "ERROR")
     found: list[Line] = []
-    if compositing.find_setup(scene) is None:
+    if find_setup(scene) is None:
         found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
     found += _map_lines(scene, now)
     found += _place_lines(now)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the add-on's nodes in a scene's compositor."""
+
+from dataclasses import dataclass
+
+import bpy
+
+# The node's custom property that says what it is for, and its values.
+ROLE = "umbra_role"
+GROUP, MAP, SKY, RENDER_LAYER, OUTPUT = "group", "map", "sky", "render_layer", "output"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The nodes of a scene's set-up."""
+
+    tree: bpy.types.NodeTree
+    group: bpy.types.Node
+    map: bpy.types.Node | None
+    sky: bpy.types.Node | None
+
+
+def has_scene_tree() -> bool:
+    """Whether this Blender keeps the compositor's tree inside the scene (before 5.0)."""
+    return bpy.app.version < (5, 0)
+
+
+def find_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
+    """The scene's compositor tree, if it has one."""
+    return scene.node_tree if has_scene_tree() else scene.compositing_node_group
+
+
+def find_node(tree: bpy.types.NodeTree, role: str) -> bpy.types.Node | None:
+    """The add-on's node of that role in a tree."""
+    return next((node for node in tree.nodes if node.get(ROLE) == role), None)
+
+
+def find_setup(scene: bpy.types.Scene) -> Setup | None:
+    """The nodes of the set-up; None where the group is not in the scene's compositor."""
+    tree = find_tree(scene)
+    if tree is None:
+        return None
+    group = find_node(tree, GROUP)
+    if group is None:
+        return None
+    return Setup(tree, group, find_node(tree, MAP), find_node(tree, SKY))
+
+
+def is_in_use(scene: bpy.types.Scene) -> bool:
+    """Whether rendering the scene runs the group."""
+    if not scene.render.use_compositing or (has_scene_tree() and not scene.use_nodes):
+        return False
+    setup = find_setup(scene)
+    return setup is not None and not setup.group.mute and any(each.is_linked for each in setup.group.outputs)
