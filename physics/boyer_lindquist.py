@@ -125,7 +125,8 @@ class PrintedSystem:
 
     def ended(self, state: Array) -> Mask:
         """Return which rays have gone far enough to count as gone, shape (n,)."""
-        return (state[R] >= self._far) & ~self.failed(state)
+        ended: Mask = (state[R] >= self._far) & ~self.failed(state)
+        return ended
 
     def failed(self, state: Array) -> Mask:
         """Return which rays came too near the axis or fell in, or broke their constants of motion; shape (n,)."""
@@ -142,7 +143,8 @@ class PrintedSystem:
             null = (delta * p_r) ** 2 + delta * (p_theta * p_theta + w * w) - big_p * big_p
             carter = p_theta * p_theta + (self._b / sin) ** 2 - a * a * cos * cos - self._carter
             drift = np.abs(null) / (big_p * big_p) + np.abs(carter) / (self._scale * self._scale)
-        return near_axis | inside | self._critical | ~(drift <= self._drift_limit)
+        failed: Mask = near_axis | inside | self._critical | ~(drift <= self._drift_limit)
+        return failed
 
     def select(self, rays: Mask) -> Self:
         """Return the system of these rays alone."""
@@ -159,9 +161,10 @@ class PrintedSystem:
         sin_theta, cos_theta, sin_phi, cos_phi = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
         outward, south, east = slope[R], r * slope[THETA], r * sin_theta * slope[PHI]
         across = outward * sin_theta + south * cos_theta
-        vector = np.stack([
+        vector: Array = np.stack([
             across * cos_phi - east * sin_phi,
             across * sin_phi + east * cos_phi,
             outward * cos_theta - south * sin_theta,
         ], axis=-1)
-        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+        unit: Array = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+        return unit

@@ -103,7 +103,7 @@ class PerspectiveCamera:
         per_pixel, fitted, tall = self._scale()
         right = (x - 0.5 * self.width + self.shift_x * fitted) * per_pixel
         up = ((0.5 * self.height - y) * tall + self.shift_y * fitted) * per_pixel
-        vectors = np.stack([right, up, np.full_like(right, -1.0)], axis=-1)
+        vectors: Array = np.stack([right, up, np.full_like(right, -1.0)], axis=-1)
         vectors /= np.sqrt(right * right + up * up + 1.0)[..., None]
         return vectors
 

@@ -112,7 +112,7 @@ def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
         channels = {name: channel.pixels for name, channel in file.channels().items()}
         header = _attributes(file)
     if "Y" in channels and "R" not in channels:
-        channels = {name: channels["Y"] for name in "RGB"} | {k: v for k, v in channels.items() if k == "A"}
+        channels = dict.fromkeys("RGB", channels["Y"]) | {k: v for k, v in channels.items() if k == "A"}
     names = [name for name in "RGBA" if name in channels]
     if names[:3] != ["R", "G", "B"]:
         raise ImageFileError(f"{path} has no channels R, G and B; it is not a picture that can be used here.")
@@ -150,7 +150,8 @@ def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
     except (RuntimeError, ValueError, TypeError, MemoryError, UnicodeDecodeError) as error:
         if isinstance(error, ImageFileError):
             raise
-        raise ImageFileError(f"{path} is damaged or cut short: {str(error).strip() or type(error).__name__}.") from error
+        detail = str(error).strip() or type(error).__name__
+        raise ImageFileError(f"{path} is damaged or cut short: {detail}.") from error
 
 
 def _attributes(file: OpenEXR.File) -> dict[str, Any]:

@@ -17,7 +17,8 @@ def srgb_from_linear(linear: ArrayLike) -> NDArray[np.uint8]:
     """Return linear Rec.709 values as 8-bit sRGB (IEC 61966-2-1), clipped; any shape."""
     value = np.clip(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0, 1.0)
     encoded = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1.0 / 2.4) - 0.055)
-    return np.round(encoded * 255.0).astype(np.uint8)
+    levels: NDArray[np.uint8] = np.round(encoded * 255.0).astype(np.uint8)
+    return levels
 
 
 def write_png(path: PathLike, linear: ArrayLike) -> None:

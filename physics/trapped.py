@@ -24,7 +24,6 @@ from .errors import BlackHoleError
 from .metric import check_spin, horizon_radius
 from .rays import Array, Rays
 
-
 # Newton's method at most doubles its digits: this many rounds serve any start.
 NEWTON_ROUNDS = 60
 
@@ -102,7 +101,8 @@ def comes_from_sky(rays: Rays, barrier: Barrier | None = None) -> NDArray[np.boo
     barrier = find_barrier(rays) if barrier is None else barrier
     unobstructed = rays.radial < 0.0
     outside = rays.observer.r > barrier.radius
-    return rays.escapes & np.where(barrier.blocks, outside, unobstructed)
+    sky: NDArray[np.bool_] = rays.escapes & np.where(barrier.blocks, outside, unobstructed)
+    return sky
 
 
 def edge_function(rays: Rays) -> Array:
@@ -204,4 +204,5 @@ def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
     r = 1.0 + x
     # R = R' = 0 gives P(r) = 2 r Delta / (r - 1) and (b - a)^2 + q = P^2 / Delta = 4 r^2 Delta / (r - 1)^2.
     delta = r * r - 2.0 * r + a * a
-    return 4.0 * r * r * delta / (x * x) - (b - a) ** 2
+    q0: Array = 4.0 * r * r * delta / (x * x) - (b - a) ** 2
+    return q0

@@ -15,7 +15,7 @@ from .rays import Array, Rays, rays_from_triad
 from .shot import WarpMapParameters, spherical_triad
 from .tracer import BLOCK_SIZE, Cancel, Fate, Progress, celestial_coordinates, drain, trace_block
 from .trapped import edge_function
-from .visibility import mark_centre, near_edge, refine
+from .visibility import cells_for_shadow, centre_block, near_edge, refine
 
 # What pixels without any sky carry for 1 + z: no redshift. 0 is kept for "no valid map".
 SHADOW_ONE_PLUS_Z = 1.0
@@ -149,13 +149,18 @@ def _bake_strip(
     columns, rows = np.meshgrid(np.arange(width + 1.0), np.arange(first, last + 1.0))
     corners = view.edge(columns.ravel(), rows.ravel()).reshape(columns.shape)
     marked = near_edge(corners)
-    mark_centre(marked, view.centre(), first)
 
     visibility = (corners[:-1, :-1] > 0.0).astype(np.float64)
     x = columns[:-1, :-1] + 0.5
     y = rows[:-1, :-1] + 0.5
     row, column = np.nonzero(marked)
     visibility[marked], x[marked], y[marked] = refine(column, row + first, view.edge)
+    centre = view.centre()
+    column, row = centre_block(centre, first, last, width)
+    if centre is not None and len(column):
+        cells = cells_for_shadow(centre, view.edge)
+        block = (row - first, column)
+        visibility[block], x[block], y[block] = refine(column, row, view.edge, cells)
     yield 0.1
 
     traced = np.flatnonzero(visibility.ravel() > 0.0)

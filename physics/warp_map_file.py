@@ -121,7 +121,7 @@ def _check_ranges(path: PathLike, *planes: NDArray[np.float32]) -> None:
 
 def _checksum(pixels: NDArray[np.float32]) -> str:
     data = np.ascontiguousarray(pixels, dtype="<f4")
-    return f"crc32 {zlib.crc32(data.reshape(-1).view(np.uint8)):08x}"
+    return f"crc32 {zlib.crc32(data.tobytes()):08x}"
 
 
 def _advice(sentence: str) -> str:

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from physics import Fate, trace_rays
 from references import angle_between, reference_cameras, unit_vectors
+
+from physics import Fate, trace_rays
 
 CAMERAS = {camera.name: camera for camera in reference_cameras()}
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from physics import BlackHoleError, Cancelled, Fate, Observer, trace_rays
-from physics import tracer
-from physics.runge_kutta import CASH_KARP, Tableau, integrate
 from references import angle_between, random_sky, unit_vectors
+
+from physics import BlackHoleError, Cancelled, Fate, Observer, trace_rays, tracer
+from physics.runge_kutta import CASH_KARP, Tableau, integrate
 
 
 def order_conditions(tableau, weights):
@@ -74,8 +74,7 @@ class Rotation:
         return np.zeros(state.shape[1], dtype=bool)
 
     def select(self, rays):
-        chosen = Rotation(self.speed[rays], self.end)
-        return chosen
+        return Rotation(self.speed[rays], self.end)
 
 
 # Dormand & Prince 1980, J. Comput. Appl. Math. 6, 19: another pair is another table.

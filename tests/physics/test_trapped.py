@@ -5,6 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from references import random_sky
+
 from physics import BlackHoleError, Observer
 from physics.metric import horizon_radius
 from physics.rays import camera_directions, rays_from_camera
@@ -16,7 +18,6 @@ from physics.trapped import (
     trapped_orbit,
     trapped_radii,
 )
-from references import random_sky
 
 CAMERAS = [
     (0.0, Observer.fido(10.0, 1.2, 0.0)),
