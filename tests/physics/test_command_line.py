@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line as a user meets it: a process of its own, its exit status and its words."""
+
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from physics import read_warp_map
+from physics.exr import read_exr, write_exr
+from physics.png import srgb_from_linear
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "physics", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+
+def read_png(path):
+    """The pixels of an 8-bit RGB PNG without filters: signature, IHDR, one IDAT."""
+    data = path.read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    width, height = (int.from_bytes(data[i : i + 4], "big") for i in (16, 20))
+    start = data.index(b"IDAT")
+    length = int.from_bytes(data[start - 4 : start], "big")
+    rows = np.frombuffer(zlib.decompress(data[start + 4 : start + 4 + length]), np.uint8).reshape(height, -1)
+    assert (rows[:, 0] == 0).all()
+    return rows[:, 1:].reshape(height, width, 3)
+
+
+@pytest.fixture(scope="module")
+def sky(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sky") / "sky.exr"
+    write_exr(path, np.full((16, 32, 3), 0.25, np.float32))
+    return path
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory):
+    path = tmp_path_factory.mktemp("maps") / "orbit.exr"
+    result = run("bake", path, "--spin", 0.999, "--radius", 10, "--inclination", 80, "--orbit", "circular",
+                 "--width", 64, "--height", 36, "--fov", 60, "--supersampling", 2)  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    assert "100 %" in result.stderr
+    assert f"wrote {path}" in result.stdout
+    return path
+
+
+def test_bake_writes_a_map_of_what_was_asked(baked):
+    warp_map = read_warp_map(baked)
+    assert warp_map.theta.shape == (72, 128)
+    parameters = warp_map.metadata["parameters"]
+    assert parameters["spin"] == 0.999
+    assert parameters["motion"] == "circular"
+    assert np.linalg.norm(parameters["camera_position"]) == pytest.approx(10.0)
+    assert warp_map.counts["shadow"] > 1000
+
+
+@pytest.mark.parametrize("ending", ["png", "exr"])
+def test_render_over_an_even_sky(baked, sky, tmp_path, ending):
+    """A sky of one colour without redshift shows the sky's colour, and the shadow as black."""
+    output = tmp_path / f"picture.{ending}"
+    result = run("render", baked, sky, output, "--redshift-colour", 0, "--redshift-brightness", 0)
+    assert result.returncode == 0, result.stderr
+    visibility = read_warp_map(baked).visibility.reshape(36, 2, 64, 2).mean(axis=(1, 3))
+    if ending == "png":
+        expected = np.repeat(srgb_from_linear(0.25 * visibility)[..., None], 3, axis=2)
+        assert np.abs(read_png(output).astype(int) - expected).max() <= 1
+    else:
+        picture, _ = read_exr(output)
+        assert picture[..., :3] == pytest.approx(0.25 * visibility[..., None].repeat(3, axis=2), abs=1e-6)
+
+
+def test_panorama(tmp_path):
+    path = tmp_path / "whole sky.exr"
+    result = run("bake", path, "--panorama", "--width", 64, "--height", 32, "--orbit", "free-fall", "--radius", 6)
+    assert result.returncode == 0, result.stderr
+    assert read_warp_map(path).metadata["parameters"]["camera"]["kind"] == "panorama"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--radius", 1.1), "inside the black hole"),
+        (("--radius", -3), "positive"),
+        (("--spin", 1), "spin"),
+        (("--inclination", 200), "0 to 180"),
+        (("--orbit", "static", "--radius", 1.9, "--inclination", 90), "ergosphere"),
+        (("--orbit", "circular-retrograde", "--radius", 3), "photon orbit"),
+        (("--fov", 180), "field of view"),
+        (("--width", 0), "size"),
+        (("--tolerance", 0), "tolerance"),
+    ],
+)
+def test_impossible_shots_end_with_one_sentence(tmp_path, arguments, words):
+    result = run("bake", tmp_path / "map.exr", "--width", 8, "--height", 8, *arguments)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("\n") == 1
+    assert words in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_wrong_files_end_with_one_sentence(baked, sky, tmp_path):
+    cases = [
+        (("bake", tmp_path / "map.png"), "does not end in .exr"),
+        (("render", sky, sky, tmp_path / "a.png"), "not a warp map"),
+        (("render", tmp_path / "no.exr", sky, tmp_path / "a.png"), "does not exist"),
+        (("render", baked, tmp_path / "no.exr", tmp_path / "a.png"), "does not exist"),
+        (("render", baked, sky, tmp_path / "a.jpg"), "must end in .png or .exr"),
+    ]
+    for arguments, words in cases:
+        result = run(*arguments)
+        assert result.returncode == 1
+        assert words in result.stderr
+        assert "Traceback" not in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_wrong_usage_is_explained():
+    result = run("bake")
+    assert result.returncode == 2
+    assert "usage" in result.stderr
+    assert run("--help").returncode == 0
+
+
+def test_unstable_orbit_and_odd_sky_are_noted(baked, tmp_path):
+    result = run("bake", tmp_path / "map.exr", "--width", 8, "--height", 8, "--spin", 0, "--radius", 5, "--orbit",
+                 "circular", "--inclination", 90)  # fmt: skip
+    assert result.returncode == 0
+    assert "unstable" in result.stderr
+    square = tmp_path / "square.exr"
+    write_exr(square, np.zeros((8, 8, 3), np.float32))
+    assert "panorama?" in run("render", baked, square, tmp_path / "a.png").stderr
