@@ -8,7 +8,18 @@ What must be known to undo that lies in custom properties, so that it is saved w
 import bpy
 
 from . import node_group
-from .compositor_tree import GROUP, MAP, OUTPUT, RENDER_LAYER, ROLE, SKY, find_node, find_tree, has_scene_tree
+from .compositor_tree import (
+    GROUP,
+    MAP,
+    OUTPUT,
+    RENDER_LAYER,
+    ROLE,
+    SKY,
+    find_node,
+    find_tree,
+    has_scene_tree,
+    render_layers,
+)
 from .errors import SceneError
 from .sync import refresh
 
@@ -23,10 +34,6 @@ _RENDER_SETTINGS = {
     # maps are baked by handlers while rendering; the viewport must not read the scene meanwhile
     "use_lock_interface": True,
 }
-
-
-def _render_layers(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> list[bpy.types.Node]:
-    return [node for node in tree.nodes if node.type == "R_LAYERS" and node.scene in (None, scene)]
 
 
 def _output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
@@ -115,9 +122,7 @@ def _check_shared(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
     if has_scene_tree():
         return
     if tree.library is not None:
-        raise SceneError(
-            f'The compositor tree "{tree.name}" is linked from another file: make it local first.'
-        )
+        raise SceneError(f'The compositor tree "{tree.name}" is linked from another file: make it local first.')
     others = [each.name for each in bpy.data.scenes if each != scene and each.compositing_node_group == tree]
     if others:
         raise SceneError(
@@ -165,9 +170,7 @@ def set_up(scene: bpy.types.Scene) -> list[str]:
     return notes
 
 
-def _insert(
-    scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.Node, notes: list[str]
-) -> None:
+def _insert(scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.Node, notes: list[str]) -> None:
     """Link the group in behind the render, unless it is."""
     map_node = find_node(tree, MAP)
     if map_node is None:
@@ -180,7 +183,7 @@ def _insert(
 
     if not group.inputs["Render"].is_linked:
         output = _output_node(tree)
-        layers = _render_layers(tree, scene)
+        layers = render_layers(tree, scene)
         layer = _background_layer(output.inputs[0], layers, set()) if output is not None else None
         if layer is None:
             layer = layers[0] if layers else _add_render_layer(tree, scene)
@@ -232,9 +235,7 @@ def remove(scene: bpy.types.Scene) -> None:
     tree = find_tree(scene)
     ours = [node for node in tree.nodes if node.get(ROLE)] if tree is not None else []
     if not ours and BEFORE not in scene:
-        raise SceneError(
-            f'The compositor of scene "{scene.name}" contains no black hole: there is nothing to remove.'
-        )
+        raise SceneError(f'The compositor of scene "{scene.name}" contains no black hole: there is nothing to remove.')
     before = dict(scene[BEFORE]) if BEFORE in scene else {}
     if tree is not None:
         tree_is_new = bool(before.get("tree_is_new"))

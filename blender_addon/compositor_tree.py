@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import bpy
 
+from .errors import SceneError
+
 # The node's custom property that says what it is for, and its values.
 ROLE = "umbra_role"
 GROUP, MAP, SKY, RENDER_LAYER, OUTPUT = "group", "map", "sky", "render_layer", "output"
@@ -52,3 +54,31 @@ def is_in_use(scene: bpy.types.Scene) -> bool:
         return False
     setup = find_setup(scene)
     return setup is not None and not setup.group.mute and any(each.is_linked for each in setup.group.outputs)
+
+
+def check_rendered(scene: bpy.types.Scene) -> None:
+    """Refuse a compositor that would run the group without rendering the scene.
+
+    Blender evaluates the scene at a frame only to render it; without that no map could be made for the frame.
+
+    Raises
+    ------
+    SceneError
+        No Render Layers node of the scene belongs to a view layer that is rendered.
+    """
+    tree = find_tree(scene)
+    layers = [node.layer for node in render_layers(tree, scene)] if tree is not None else []
+    if not layers:
+        raise SceneError(
+            f'The compositor of scene "{scene.name}" has no Render Layers node, so nothing is rendered: add one, or '
+            "run Set Up Compositor."
+        )
+    if not any(scene.view_layers[name].use for name in layers if name in scene.view_layers):
+        raise SceneError(
+            f'View layer "{layers[0]}" is not rendered: switch on Use for Rendering in its View Layer Properties.'
+        )
+
+
+def render_layers(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> list[bpy.types.Node]:
+    """The Render Layers nodes of a scene in a compositor tree."""
+    return [node for node in tree.nodes if node.type == "R_LAYERS" and node.scene in (None, scene)]

@@ -4,7 +4,7 @@
 For each frame Blender calls render_pre, then frame_change_post with the render's own dependency graph, where
 animation, constraints and the camera of this frame are evaluated; then it renders and runs the compositor. So
 render_pre takes the map away (the picture is magenta now), and only frame_change_post gives a valid one back.
-render_post comes before the picture is written, and sees whether that happened.
+render_post, which comes when the picture has been written, only makes sure that this happened.
 """
 
 import atexit
@@ -16,19 +16,17 @@ from bpy.app.handlers import persistent
 
 from . import baking, maps, messages, node_group, shot, sync
 from ._physics import physics
-from .compositor_tree import find_setup, is_in_use
+from .compositor_tree import check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
 
-# Scenes whose current frame is being rendered and has no valid map yet, by name.
-_waiting: dict[str, str] = {}
+# Names of scenes whose current frame is being rendered and has no valid map yet.
+_waiting: set[str] = set()
 # The compositor device of scenes that are being rendered without a window, to be set back.
 _devices: dict[str, str] = {}
 # Scenes that an error was already shown for in this render.
 _told: set[str] = set()
 # Set while this module itself steps the scene to other frames.
 _busy = False
-
-_NOT_EVALUATED = "none of its view layers was rendered; enable one, or connect a Render Layers node"
 
 
 def _guarded(work: Callable[[bpy.types.Scene], None], scene: bpy.types.Scene) -> None:
@@ -41,10 +39,14 @@ def _guarded(work: Callable[[bpy.types.Scene], None], scene: bpy.types.Scene) ->
         _fail(scene, f"An unexpected fault ({type(error).__name__}: {error}); please report it.")
 
 
+def without_window() -> bool:
+    """Whether nobody is there to read a message: a failure then has to end the process."""
+    return bpy.app.background
+
+
 def _fail(scene: bpy.types.Scene, text: str) -> None:
-    _waiting.pop(scene.name, None)
-    if bpy.app.background:
-        _restore_device(scene)
+    _waiting.discard(scene.name)
+    if without_window():
         messages.end_process(text)
     sync.point_at_nothing(scene)
     messages.warn(text)
@@ -74,8 +76,8 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A frame begins."""
     if not is_in_use(scene):
         return
-    _waiting[scene.name] = _NOT_EVALUATED
-    _guarded(sync.point_at_nothing, scene)
+    _waiting.add(scene.name)
+    _guarded(_take_map_away, scene)
 
 
 @persistent
@@ -88,18 +90,22 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
 
 @persistent
 def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
-    """The frame is composited and not written yet."""
-    reason = _waiting.pop(scene.name, None)
-    if reason is not None:
-        _fail(scene, f'Frame {scene.frame_current} of scene "{scene.name}" has no warp map: {reason}.')
+    """The frame is done."""
+    if scene.name in _waiting:
+        _fail(scene, f'Frame {scene.frame_current} of scene "{scene.name}" was rendered without a warp map.')
 
 
 @persistent
 def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The render is complete or cancelled."""
-    _waiting.pop(scene.name, None)
+    _waiting.discard(scene.name)
     _restore_device(scene)
     sync.refresh(scene)
+
+
+def _take_map_away(scene: bpy.types.Scene) -> None:
+    sync.point_at_nothing(scene)
+    check_rendered(scene)
 
 
 def _restore_device(scene: bpy.types.Scene) -> None:
@@ -128,7 +134,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
         for _fraction in baking.bake_map(path, parameters):
             pass
     sync.point_at_maps(scene)
-    del _waiting[scene.name]
+    _waiting.discard(scene.name)
 
 
 # --- files ----------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = (64, 36)
+PROCESS_TIMEOUT = 300  # seconds
 
 
 def shrink(scene: bpy.types.Scene, size: tuple[int, int] = SIZE) -> None:
@@ -134,18 +135,23 @@ def links_of(tree: bpy.types.NodeTree) -> set[tuple[str, str, str, str]]:
     }
 
 
-def run_python(
-    code: str, *, resources: str | None = None, timeout: float = 300
-) -> subprocess.CompletedProcess[str]:
-    """Run a script in a Python of its own, in which bpy finds the extension that these tests installed."""
-    prelude = "import bpy\nbpy.ops.wm.read_userpref()\n"
-    environment = {**os.environ, **({"BLENDER_USER_RESOURCES": resources} if resources else {})}
+def run_python(code: str, *, resources: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a script in a process of its own, with the extension that these tests installed.
+
+    With a folder for `resources`, Blender keeps to that one instead, in which nothing is installed.
+    """
+    enable = "bpy.ops.preferences.addon_enable(module='bl_ext.user_default.umbra_black_hole')\n"
+    environment = dict(os.environ)
+    if resources is not None:
+        resources.mkdir(exist_ok=True)
+        environment["BLENDER_USER_RESOURCES"] = str(resources)
+        enable = ""
+    tools = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
     return subprocess.run(
-        [sys.executable, "-c", prelude + code],
+        [sys.executable, "-c", f"import bpy\n{enable}{tools}{code}"],
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=PROCESS_TIMEOUT,
         check=False,
         env=environment,
-        cwd=ROOT,
     )

@@ -26,9 +26,7 @@ def read(shot: ModuleType, frame: int = 1):
     return shot.read_at(bpy.context.scene, frame).parameters
 
 
-def place_camera(
-    location: tuple[float, float, float], rotation: tuple[float, float, float]
-) -> bpy.types.Object:
+def place_camera(location: tuple[float, float, float], rotation: tuple[float, float, float]) -> bpy.types.Object:
     camera = bpy.context.scene.camera
     camera.location = location
     camera.rotation_euler = rotation
@@ -73,16 +71,12 @@ def test_rotated_scaled_moved_hole_with_a_parent(shot: ModuleType) -> None:
     assert parameters.camera_position == pytest.approx(tuple(in_hole), abs=2e-5)
     np.testing.assert_allclose(parameters.hole_to_world, np.array(turn), atol=2e-6)
     camera_axes = Euler((1.1, 0.1, 0.8)).to_matrix()
-    np.testing.assert_allclose(
-        parameters.camera_to_hole, np.array(turn.transposed() @ camera_axes), atol=2e-6
-    )
+    np.testing.assert_allclose(parameters.camera_to_hole, np.array(turn.transposed() @ camera_axes), atol=2e-6)
 
 
 @pytest.mark.parametrize("size", [(64, 36), (36, 64), (50, 50)])
 @pytest.mark.parametrize("fit", ["AUTO", "HORIZONTAL", "VERTICAL"])
-def test_the_frame_of_a_shifted_lens_is_blenders_own(
-    shot: ModuleType, fit: str, size: tuple[int, int]
-) -> None:
+def test_the_frame_of_a_shifted_lens_is_blenders_own(shot: ModuleType, fit: str, size: tuple[int, int]) -> None:
     scene = bpy.context.scene
     shrink(scene, size)
     add_hole(scene)
@@ -95,9 +89,7 @@ def test_the_frame_of_a_shifted_lens_is_blenders_own(
     top_right, bottom_right, bottom_left, top_left = (
         np.array(corner.normalized()) for corner in data.view_frame(scene=scene)
     )
-    directions = read(shot).camera.directions(
-        np.array([width, width, 0.0, 0.0]), np.array([0.0, height, height, 0.0])
-    )
+    directions = read(shot).camera.directions(np.array([width, width, 0.0, 0.0]), np.array([0.0, height, height, 0.0]))
     np.testing.assert_allclose(directions, [top_right, bottom_right, bottom_left, top_left], atol=1e-6)
 
 
@@ -137,7 +129,7 @@ def test_panorama(shot: ModuleType, errors: ModuleType) -> None:
     assert (camera.latitude_min, camera.longitude_max) == pytest.approx((-0.5, 1.25))
 
     owner.panorama_type = "FISHEYE_EQUISOLID"
-    with pytest.raises(errors.BlackHoleError, match="Fisheye Equisolid.*Equirectangular"):
+    with pytest.raises(errors.BlackHoleError, match=r"Fisheye Equisolid.*Equirectangular"):
         read(shot)
     owner.panorama_type = "EQUIRECTANGULAR"
     scene.render.engine = "BLENDER_WORKBENCH"

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baking by operator: at once without a window, step by step beside one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from scene_tools import add_hole, render, shrink
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    scene = bpy.context.scene
+    shrink(scene)
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    scene.frame_start, scene.frame_end = 1, 3
+    return scene
+
+
+def maps_in(tmp_path: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in sorted((tmp_path / "maps").glob("*.exr"))}
+
+
+def move_camera(scene: bpy.types.Scene) -> None:
+    for frame in (1, 3):
+        scene.camera.location.z = 4.0 + frame
+        scene.camera.keyframe_insert("location", frame=frame)
+
+
+def test_one_frame(scene: bpy.types.Scene, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    add_hole(scene)
+    scene.frame_set(2)
+    assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
+    assert list(maps_in(tmp_path)) == ["Scene_Black_Hole_64x36_0002.exr"]
+    assert "Umbra: baking warp maps" in capfd.readouterr().out
+    assert scene.frame_current == 2
+
+
+def test_animation_bakes_what_is_missing_or_stale(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    hole = add_hole(scene)
+    move_camera(scene)
+    scene.frame_set(2)
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    assert scene.frame_current == 2
+    first = maps_in(tmp_path)
+    assert len(first) == 3
+
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    assert maps_in(tmp_path) == first
+
+    # only frame 3 is changed by this key
+    hole.umbra.keyframe_insert("spin", frame=2)
+    hole.umbra.spin = 0.1
+    hole.umbra.keyframe_insert("spin", frame=3)
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    changed = {name for name, stamp in maps_in(tmp_path).items() if first[name] != stamp}
+    assert changed == {"Scene_Black_Hole_64x36_0003.exr"}
+
+
+def test_rendering_uses_what_was_baked(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    move_camera(scene)
+    bpy.ops.umbra.bake_animation()
+    before = maps_in(tmp_path)
+    scene.render.filepath = str(tmp_path / "frame_####")
+    scene.umbra.auto_bake = False
+    bpy.ops.render.render(animation=True)
+    assert maps_in(tmp_path) == before
+
+
+def test_a_rebaked_map_of_the_same_frame_is_seen(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    hole = add_hole(scene)
+    exr = addon_module("_physics").exr
+    bpy.ops.umbra.bake_frame()
+    first = render(scene, tmp_path / "a.exr", exr)
+    hole.umbra.mass_scale *= 1.5
+    bpy.ops.umbra.bake_frame()
+    second = render(scene, tmp_path / "b.exr", exr)
+    assert np.abs(second - first).max() > 0.1
+
+
+def test_errors_become_reports_that_name_the_frame(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="contains no black hole"):
+        bpy.ops.umbra.bake_frame()
+    add_hole(scene)
+    scene.camera.location = (0.05, 0.0, 0.0)
+    with pytest.raises(RuntimeError, match="horizon"):
+        bpy.ops.umbra.bake_frame()
+    with pytest.raises(RuntimeError, match=r"Frame 1: .*horizon"):
+        bpy.ops.umbra.bake_animation()
+    assert not maps_in(tmp_path)
+
+
+def test_folders_that_cannot_be_used(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    add_hole(scene)
+    (tmp_path / "file").write_text("not a folder")
+    scene.umbra.map_folder = str(tmp_path / "file" / "maps")
+    with pytest.raises(RuntimeError, match=r"cannot be written to .*choose another folder"):
+        bpy.ops.umbra.bake_frame()
+    scene.umbra.map_folder = "/proc/umbra"
+    with pytest.raises(RuntimeError, match="cannot be written to"):
+        bpy.ops.umbra.bake_frame()
+
+
+def test_a_full_disk(
+    scene: bpy.types.Scene,
+    tmp_path: Path,
+    addon_module: Callable[[str], ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    add_hole(scene)
+    usage = SimpleNamespace(total=10, used=10, free=1000)
+    monkeypatch.setattr(addon_module("maps").shutil, "disk_usage", lambda _path: usage)
+    with pytest.raises(RuntimeError, match=r"disk of the warp map folder .* is full"):
+        bpy.ops.umbra.bake_frame()
+    assert not maps_in(tmp_path)
+
+
+def test_steps_yield_often_and_leave_the_scene_at_its_frame(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    move_camera(scene)
+    scene.frame_set(2)
+    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    fractions = []
+    for progress in steps:
+        assert scene.frame_current == 2
+        fractions.append(progress.fraction)
+    assert fractions == sorted(fractions)
+    assert fractions[0] == 0.0
+    assert fractions[-1] <= 1.0
+    assert len(maps_in(tmp_path)) == 3
+
+
+def test_closing_the_generator_cancels_and_keeps_finished_maps(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    while next(steps).frame == 1:
+        pass
+    steps.close()
+    assert list(maps_in(tmp_path)) == ["Scene_Black_Hole_64x36_0001.exr"]
+
+
+def test_a_scene_that_vanishes_ends_the_bake(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
+    add_hole(scene)
+    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    next(steps)
+    scene.name = "Renamed"
+    with pytest.raises(addon_module("errors").SceneError, match='"Scene" is gone'):
+        list(steps)
+
+
+class Window:
+    """What the modal operator needs of Blender's window, for a test without one."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self.scene = scene
+        self.view_layer = scene.view_layers[0]
+        self.window = object()
+        self.workspace = SimpleNamespace(status_text_set=lambda text: setattr(self, "status", text))
+        self.status = ""
+        self.removed = 0
+        self.window_manager = SimpleNamespace(
+            windows=[],
+            progress_begin=lambda *_: None,
+            progress_update=lambda _: None,
+            progress_end=lambda: None,
+            event_timer_add=lambda *_, **__: "timer",
+            event_timer_remove=lambda _: setattr(self, "removed", self.removed + 1),
+            modal_handler_add=lambda _: None,
+        )
+
+
+@pytest.fixture
+def modal(addon_module: Callable[[str], ModuleType]) -> SimpleNamespace:
+    """The operator's methods on a stand-in, because Blender makes operators only in windows."""
+    operators = addon_module("operators")
+    reports: list[tuple[set[str], str]] = []
+
+    class Stand(operators.BakeOperator):
+        frames = operators.UMBRA_OT_bake_animation.frames
+
+        def report(self, kind: set[str], text: str) -> None:
+            reports.append((kind, text))
+
+    return SimpleNamespace(operator=Stand(), reports=reports, module=operators)
+
+
+TIMER = SimpleNamespace(type="TIMER", value="NOTHING")
+ESCAPE = SimpleNamespace(type="ESC", value="PRESS")
+MOUSE = SimpleNamespace(type="MOUSEMOVE", value="NOTHING")
+
+
+def test_modal_bake(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespace) -> None:
+    add_hole(scene)
+    window = Window(scene)
+    assert modal.operator._begin(window) == {"RUNNING_MODAL"}
+    assert modal.module.running is not None
+    assert not bpy.ops.umbra.bake_frame.poll()
+    assert modal.operator.modal(window, MOUSE) == {"PASS_THROUGH"}  # the interface stays usable
+    while (result := modal.operator.modal(window, TIMER)) == {"PASS_THROUGH"}:
+        assert "Esc" in window.status
+    assert result == {"FINISHED"}
+    assert len(maps_in(tmp_path)) == 3
+    assert modal.reports[-1][1].startswith("Baked 3 warp maps")
+    assert modal.module.running is None
+    assert window.removed == 1
+    assert window.status is None
+
+
+def test_modal_escape(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespace) -> None:
+    add_hole(scene)
+    window = Window(scene)
+    modal.operator._begin(window)
+    modal.operator.modal(window, TIMER)
+    assert modal.operator.modal(window, ESCAPE) == {"CANCELLED"}
+    assert modal.module.running is None
+    assert not maps_in(tmp_path)
+    assert "stopped" in modal.reports[-1][1]
+
+
+def test_modal_error(scene: bpy.types.Scene, modal: SimpleNamespace) -> None:
+    add_hole(scene)
+    window = Window(scene)
+    modal.operator._begin(window)
+    scene.camera.data.type = "ORTHO"
+    while (result := modal.operator.modal(window, TIMER)) == {"PASS_THROUGH"}:
+        pass
+    assert result == {"CANCELLED"}
+    assert modal.reports[-1][0] == {"ERROR"}
+    assert "orthographic" in modal.reports[-1][1]
+    assert modal.module.running is None
+
+
+def test_the_panel_tells_the_state(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    status = addon_module("status")
+
+    def text() -> str:
+        status._counted.clear()
+        return " ".join(line.text for line in status.lines(bpy.context))
+
+    assert "no black hole" in text()
+    hole = add_hole(scene)
+    assert "is not baked" in text()
+    assert "0 of 3 frames baked" in text()
+    bpy.ops.umbra.bake_frame()
+    assert "is up to date" in text()
+    assert "1 of 3 frames baked" in text()
+    assert "Camera at 32.16 M" in text()
+    hole.umbra.spin = 0.2
+    assert "is out of date" in text()
+    hole.umbra.mass_scale = 3.0
+    assert "inside the innermost stable circular orbit" in text()
+    hole.umbra.motion = "CIRCULAR"
+    assert "unstable" in text()
+    scene.camera.data.type = "ORTHO"
+    assert "orthographic" in text()
+    scene.camera.data.type = "PERSP"
+    bpy.ops.umbra.remove_compositor()
+    assert "not set up" in text()
