@@ -33,7 +33,7 @@ import bpy
 
 from . import compositor_nodes
 from ._physics import physics
-from .node_helpers import TreeBuilder
+from .node_helpers import SETTINGS_ARE_SOCKETS, TreeBuilder
 
 GROUP_NAME = "Umbra Black Hole"
 GROUP_VERSION = 1
@@ -137,9 +137,7 @@ TEMPERATURE = SocketSpec(
     maximum=40000.0,
     subtype="COLOR_TEMPERATURE",
 )
-IMAGE = SocketSpec(
-    "Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT"
-)
+IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
 SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole and the sky without the scene", in_out="OUTPUT")
 SHADOW = SocketSpec(
     "Shadow", "NodeSocketFloat", "Mask of the black hole's shadow: 1 inside, 0 outside", in_out="OUTPUT"
@@ -224,7 +222,8 @@ def _blender_series() -> str:
 
 def _rebuild(tree: bpy.types.NodeTree) -> None:
     tree.nodes.clear()
-    _match_interface(tree)
+    for spec in _match_interface(tree):
+        _set_default_in_users(tree, spec)
     builder = TreeBuilder(tree)
     group_input = builder.node("NodeGroupInput")
     sockets = {socket.name: socket for socket in group_input.outputs}
@@ -249,8 +248,11 @@ def _rebuild(tree: bpy.types.NodeTree) -> None:
     tree[CONTENT_KEY] = _fingerprint(tree)
 
 
-def _match_interface(tree: bpy.types.NodeTree) -> None:
-    """Make the sockets what they should be, keeping those that exist: values and links hang on them."""
+def _match_interface(tree: bpy.types.NodeTree) -> list[SocketSpec]:
+    """Make the sockets what they should be, keeping those that exist: values and links hang on them.
+
+    Returns the inputs that did not exist before.
+    """
     interface = tree.interface
     wanted = {(spec.in_out, spec.name): spec for spec in (*OUTPUTS, *INPUTS)}
     kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
@@ -262,12 +264,26 @@ def _match_interface(tree: bpy.types.NodeTree) -> None:
     survivors = set(kept.values())
     for item in [item for item in interface.items_tree if item not in survivors]:
         interface.remove(item)
+    added = []
     for position, (key, spec) in enumerate(wanted.items()):
-        item = kept.get(key) or interface.new_socket(
-            spec.name, in_out=spec.in_out, socket_type=spec.socket_type
-        )
+        item = kept.get(key)
+        if item is None:
+            item = interface.new_socket(spec.name, in_out=spec.in_out, socket_type=spec.socket_type)
+            added.append(spec)
         _describe(item, spec)
         interface.move(item, position)
+    return [spec for spec in added if spec.in_out == "INPUT"]
+
+
+def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
+    """Give a new input its default in existing group nodes, where Blender made it before it had one."""
+    users = list(bpy.data.node_groups)
+    if not SETTINGS_ARE_SOCKETS:
+        users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
+    for user in users:
+        for node in user.nodes:
+            if node.bl_idname == GROUP_NODE_TYPE and node.node_tree == tree:
+                node.inputs[spec.name].default_value = spec.default
 
 
 def _describe(item: bpy.types.NodeTreeInterfaceSocket, spec: SocketSpec) -> None:
@@ -308,9 +324,7 @@ def _fingerprint(tree: bpy.types.NodeTree) -> str:
 def _interface_line(item: bpy.types.NodeTreeInterfaceItem) -> str:
     if item.item_type != "SOCKET":
         return item.item_type
-    details = [
-        getattr(item, name, "") for name in ("description", "subtype", "min_value", "max_value", "hide_value")
-    ]
+    details = [getattr(item, name, "") for name in ("description", "subtype", "min_value", "max_value", "hide_value")]
     return f"{item.in_out} {item.name} {item.identifier} {item.socket_type} {details}"
 
 
