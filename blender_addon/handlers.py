@@ -34,7 +34,8 @@ def _guarded(work: Callable[[bpy.types.Scene], None], scene: bpy.types.Scene) ->
     try:
         work(scene)
     except physics.BlackHoleError as error:
-        _fail(scene, str(error))
+        frame = f"Frame {scene.frame_current}: "
+        _fail(scene, str(error) if str(error).startswith(frame) else frame + str(error))
     except Exception as error:  # noqa: BLE001  a fault of ours must not end as a wrong picture either
         _fail(scene, f"An unexpected fault ({type(error).__name__}: {error}); please report it.")
 
@@ -48,6 +49,7 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
     _waiting.discard(scene.name)
     if without_window():
         messages.end_process(text)
+        return
     sync.point_at_nothing(scene)
     messages.warn(text)
     if scene.name not in _told:
@@ -76,6 +78,8 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A frame begins."""
     if not is_in_use(scene):
         return
+    if messages.is_ending():
+        messages.end_process("A frame before this one failed.")
     _waiting.add(scene.name)
     _guarded(_take_map_away, scene)
 
@@ -92,7 +96,7 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
 def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The frame is done."""
     if scene.name in _waiting:
-        _fail(scene, f'Frame {scene.frame_current} of scene "{scene.name}" was rendered without a warp map.')
+        _fail(scene, f"Frame {scene.frame_current} was rendered without a warp map.")
 
 
 @persistent
@@ -127,8 +131,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     if not maps.is_fresh(path, parameters):
         if not scene.umbra.auto_bake:
             raise SceneError(
-                f"The warp map of frame {frame_shot.frame} is missing or out of date: bake it, or switch on "
-                "Bake When Rendering in the Umbra panel."
+                "The warp map is missing or out of date: bake it, or switch on Bake When Rendering in the Umbra panel."
             )
         print(f"Umbra: baking the warp map of frame {frame_shot.frame}", flush=True)
         for _fraction in baking.bake_map(path, parameters):
@@ -147,7 +150,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     _devices.clear()
     for scene in bpy.data.scenes:
         setup = find_setup(scene)
-        if setup is not None and setup.group.library is None:
+        if setup is not None and scene.library is None and setup.tree.library is None:
             setup.group.node_tree = node_group.ensure_group()
             sync.refresh(scene)
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tell the artist what went wrong while rendering, where no operator can report it."""
 
+import atexit
 import os
+import signal
 import sys
 import textwrap
 
@@ -10,6 +12,7 @@ import bpy
 POPUP_WIDTH = 80  # characters a line
 
 _pending: list[str] = []
+_is_ending = False
 
 
 def warn(text: str) -> None:
@@ -49,12 +52,27 @@ def forget() -> None:
 
 
 def end_process(text: str) -> None:
-    """End a process without a window with exit status 1, before it can write a wrong picture.
+    """Make a process without a window end with exit status 1, before a wrong picture is written.
 
-    Blender swallows exceptions of handlers and goes on rendering, so ending the process is the only way for a
-    render farm or a script to learn of the failure. Frames that are already written stay.
+    Blender swallows exceptions of handlers and goes on rendering, so the exit status is the only way for a render
+    farm or a script to learn of the failure. Frames that are already written stay.
+
+    Blender's executable is asked to break the render off as by Ctrl-C: it writes no more frames, but finishes a
+    movie that it has begun. In Python's own process (the bpy module) Ctrl-C is Python's, and the process is ended
+    at once.
     """
-    print(f"Error: Umbra Black Hole: {text}", file=sys.stderr)
+    global _is_ending
+    if not _is_ending:
+        print(f"Error: Umbra Black Hole: {text}", file=sys.stderr)
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(1)
+    if _is_ending or callable(signal.getsignal(signal.SIGINT)):
+        os._exit(1)
+    _is_ending = True
+    atexit.register(os._exit, 1)  # Blender itself would end with 0
+    signal.raise_signal(signal.SIGINT)
+
+
+def is_ending() -> bool:
+    """Whether the process has been told to end."""
+    return _is_ending

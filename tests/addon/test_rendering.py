@@ -288,10 +288,14 @@ def test_saving_and_loading(
     assert adopted.is_file()
     stamp = adopted.stat().st_mtime_ns
 
+    # a file from an older version of the add-on: the group's version is stamped on it
+    addon_module("compositor_tree").find_setup(scene).group.node_tree["umbra_version"] = 0
+    bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     assert scene.umbra.active_hole.umbra.motion == "STATIC"
     setup = addon_module("compositor_tree").find_setup(scene)
+    assert setup.group.node_tree["umbra_version"] == addon_module("node_group").GROUP_VERSION
     assert setup.map.image.filepath == "//umbra_maps/Scene_Black_Hole_64x36_0001.exr"
     np.testing.assert_array_equal(render(scene, tmp_path / "after.exr", exr), picture)
     assert adopted.stat().st_mtime_ns == stamp
