@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ._physics import physics
+from ._physics import colour, reference_render
 from .node_helpers import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder, Value
 
 _HALVINGS = 2
@@ -96,9 +96,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
         factor = builder.math("MULTIPLY", factor, channels.visibility)
         sky = builder.vector_math("MULTIPLY", environment, gain)
         sky = builder.vector_scale(sky, factor)
-        sky = builder.select_vector(
-            channels.valid, physics.reference_render.MAGENTA, sky, "Magenta if invalid"
-        )
+        sky = builder.select_vector(channels.valid, reference_render.MAGENTA, sky, "Magenta if invalid")
         data = builder.combine(channels.visibility, channels.one_plus_z, channels.valid)
     with builder.frame("To the render's size"):
         sky, data = _to_render_size(builder, sky, data)
@@ -108,9 +106,9 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
 
 def _read_map(builder: TreeBuilder, warp_map: Value) -> _MapChannels:
     """Tell pixels that a valid map can hold from others, and replace the others by harmless values."""
-    slack = physics.reference_render.ANGLE_SLACK
-    smallest = physics.reference_render.SMALLEST_ONE_PLUS_Z
-    largest = physics.reference_render.LARGEST_ONE_PLUS_Z
+    slack = reference_render.ANGLE_SLACK
+    smallest = reference_render.SMALLEST_ONE_PLUS_Z
+    largest = reference_render.LARGEST_ONE_PLUS_Z
     theta, phi, one_plus_z, visibility = builder.separate_colour(warp_map)
     # Every comparison is false for NaN, so NaN makes a pixel invalid.
     conditions = (
@@ -137,9 +135,7 @@ def _read_map(builder: TreeBuilder, warp_map: Value) -> _MapChannels:
     )
 
 
-def _texture_coordinates(
-    builder: TreeBuilder, channels: _MapChannels, rotation: Value
-) -> tuple[Socket, Socket]:
+def _texture_coordinates(builder: TreeBuilder, channels: _MapChannels, rotation: Value) -> tuple[Socket, Socket]:
     """Texture coordinates of the rotated direction: u within -0.6..0.6 (it repeats), v in 0..1 from below.
 
     The rotation is R = Rz Ry Rx. Rz only adds to the longitude; Ry Rx needs the vector, whose float32
@@ -215,8 +211,7 @@ def _sample_environment(builder: TreeBuilder, environment: Value, u: Socket, v: 
     mixed = []
     for row_at in rows:
         texels = [
-            builder.map_uv(environment, builder.combine(column_at, row_at, 1.0), "Nearest")
-            for column_at in columns
+            builder.map_uv(environment, builder.combine(column_at, row_at, 1.0), "Nearest") for column_at in columns
         ]
         mixed.append(builder.select_vector(share_x, *texels))
     return builder.select_vector(share_y, *mixed)
@@ -233,8 +228,8 @@ def _redshift_gain(builder: TreeBuilder, one_plus_z: Socket, inputs: GroupInputs
     power = builder.math("MULTIPLY", builder.math("MULTIPLY", 4.0, excess), _natural_log(builder, one_plus_z))
     temperature = builder.math("MAXIMUM", 1.0, inputs.temperature)
     gains = []
-    for wavelength in physics.colour.CHANNEL_WAVELENGTHS:
-        x = builder.math("DIVIDE", physics.colour.SECOND_RADIATION_CONSTANT / wavelength, temperature)
+    for wavelength in colour.CHANNEL_WAVELENGTHS:
+        x = builder.math("DIVIDE", colour.SECOND_RADIATION_CONSTANT / wavelength, temperature)
         y = builder.math("MULTIPLY", x, one_plus_z)
         ratio = builder.math("SUBTRACT", _log_of_planck_term(builder, x), _log_of_planck_term(builder, y))
         ratio = builder.math("ADD", builder.math("SUBTRACT", x, y), ratio)
@@ -269,7 +264,7 @@ def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[So
         halve = builder.math(
             "GREATER_THAN",
             builder.math("DIVIDE", width, area_width),
-            physics.reference_render.HALVE_ABOVE,
+            reference_render.HALVE_ABOVE,
             label="Halve?",
         )
         factor = builder.math("MULTIPLY_ADD", halve, -0.5, 1.0)
@@ -319,9 +314,7 @@ def _centring(builder: TreeBuilder, size: Socket, area_size: Socket) -> Socket:
     not scaled need. It does so when it interpolates bilinearly; nearest pixels stay where they belong.
     """
     parity = builder.math("FLOORED_MODULO", builder.math("ADD", size, area_size), 2.0)
-    return builder.math(
-        "DIVIDE", builder.math("MULTIPLY", parity, builder.math("MULTIPLY", 0.5, area_size)), size
-    )
+    return builder.math("DIVIDE", builder.math("MULTIPLY", parity, builder.math("MULTIPLY", 0.5, area_size)), size)
 
 
 def _stretch(builder: TreeBuilder, image: Socket, area: Socket, shifts: tuple[Socket, Socket]) -> Socket:
@@ -363,7 +356,7 @@ def _compose(builder: TreeBuilder, render: Value, sky: Socket, data: Socket) -> 
     visibility, one_plus_z, valid = builder.separate(data)
     _, _, _, alpha = builder.separate_colour(render)
     image = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, alpha), render)
-    image = builder.select_vector(valid, physics.reference_render.MAGENTA, image, "Magenta if invalid")
+    image = builder.select_vector(valid, reference_render.MAGENTA, image, "Magenta if invalid")
     return GroupOutputs(
         image=image,
         sky=sky,

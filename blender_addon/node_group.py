@@ -32,7 +32,7 @@ from dataclasses import dataclass, fields
 import bpy
 
 from . import compositor_nodes
-from ._physics import physics
+from ._physics import colour
 from .node_helpers import SETTINGS_ARE_SOCKETS, TreeBuilder
 
 GROUP_NAME = "Umbra Black Hole"
@@ -132,7 +132,7 @@ TEMPERATURE = SocketSpec(
     "Sky Temperature",
     "NodeSocketFloat",
     "Colour temperature of the sky's light (kelvin) from which the shift of its colour is computed",
-    default=physics.colour.DEFAULT_TEMPERATURE,
+    default=colour.DEFAULT_TEMPERATURE,
     minimum=1000.0,
     maximum=40000.0,
     subtype="COLOR_TEMPERATURE",
