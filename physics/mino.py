@@ -197,13 +197,7 @@ class TurningRays(MinoSystem):
     """Rays with a turning point u_t between hole and camera: u = u_t (1 - x^2)."""
 
     def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
-        turning, rates = _turning_point(rays, barrier)
-        u = 1.0 / rays.observer.r
-        apart = np.maximum(1.0 - u / turning, 0.0)  # x^2 at the camera, short of digits when small
-        slope = np.sqrt(rates[0] + apart * (rates[1] + apart * (rates[2] + apart * rates[3])))
-        # u'^2 = U gives x without that loss: u' = -2 u_t x x', and |u'| = u^2 |Delta p_r|.
-        start = -rays.radial * (u * u) / (turning * slope)
-        super().__init__(rays, tolerance, start, turning, 0.25 * rates)
+        super().__init__(rays, tolerance, *turning_polynomial(rays, barrier))
 
     @staticmethod
     def argument(x: Array) -> Array:
@@ -219,29 +213,45 @@ class DirectRays(MinoSystem):
     """
 
     def __init__(self, rays: Rays, barrier: Barrier, tolerance: float) -> None:
-        r = rays.observer.r
-        ahead = barrier.radius > r
-        unit = 1.0 / np.where(ahead, barrier.radius, r)
-        square = unit * unit
-        c2, c3, c4 = radial_polynomial(rays)
-        # U(u_c (1 - x)) / u_c^2 as a polynomial in x. U = u^4 R, hence U' = 4 u^3 R - u^2 R'.
-        rates = np.stack([
-            square * np.where(ahead, barrier.height, rays.radial**2),
-            np.where(
-                ahead,
-                unit * barrier.slope - 4.0 * square * barrier.height,
-                -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
-            ),
-            c2 + 3.0 * c3 * unit + 6.0 * c4 * square,
-            -unit * (c3 + 4.0 * c4 * unit),
-            c4 * square,
-        ])
-        super().__init__(rays, tolerance, 1.0 - 1.0 / (r * unit), unit, rates)
+        super().__init__(rays, tolerance, *direct_polynomial(rays, barrier))
 
     @staticmethod
     def argument(x: Array) -> Array:
         """Return x."""
         return x
+
+
+def direct_polynomial(rays: Rays, barrier: Barrier) -> tuple[Array, Array, Array]:
+    """Return x at the camera and u_c, shape (n,), and the polynomial U / u_c^2 in x of `DirectRays`, shape (5, n)."""
+    r = rays.observer.r
+    ahead = barrier.radius > r
+    unit = 1.0 / np.where(ahead, barrier.radius, r)
+    square = unit * unit
+    c2, c3, c4 = radial_polynomial(rays)
+    # U = u^4 R, hence U' = 4 u^3 R - u^2 R'.
+    rates = np.stack([
+        square * np.where(ahead, barrier.height, rays.radial**2),
+        np.where(
+            ahead,
+            unit * barrier.slope - 4.0 * square * barrier.height,
+            -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
+        ),
+        c2 + 3.0 * c3 * unit + 6.0 * c4 * square,
+        -unit * (c3 + 4.0 * c4 * unit),
+        c4 * square,
+    ])
+    return 1.0 - 1.0 / (r * unit), unit, rates
+
+
+def turning_polynomial(rays: Rays, barrier: Barrier) -> tuple[Array, Array, Array]:
+    """Return x at the camera and u_t, shape (n,), and the polynomial G / 4 in x^2 of `TurningRays`, shape (4, n)."""
+    turning, rates = _turning_point(rays, barrier)
+    u = 1.0 / rays.observer.r
+    apart = np.maximum(1.0 - u / turning, 0.0)  # x^2 at the camera, short of digits when small
+    slope = np.sqrt(rates[0] + apart * (rates[1] + apart * (rates[2] + apart * rates[3])))
+    # u'^2 = U gives x without that loss: u' = -2 u_t x x', and |u'| = u^2 |Delta p_r|.
+    start = -rays.radial * (u * u) / (turning * slope)
+    return start, turning, 0.25 * rates
 
 
 def _turning_point(rays: Rays, barrier: Barrier) -> tuple[Array, Array]:
