@@ -101,10 +101,15 @@ def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
 
 @persistent
 def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
-    """The render is complete or cancelled."""
-    _waiting.discard(scene.name)
+    """The render is complete or cancelled.
+
+    After a failure the map stays away: the window runs the compositor once more when the render is over, and an
+    older map would then hide the magenta.
+    """
     _restore_device(scene)
-    sync.refresh(scene)
+    if scene.name in _waiting:  # cancelled half-way
+        _waiting.discard(scene.name)
+        sync.refresh(scene)
 
 
 def _take_map_away(scene: bpy.types.Scene) -> None:

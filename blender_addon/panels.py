@@ -19,7 +19,7 @@ def _draw_hole(layout: bpy.types.UILayout, hole: bpy.types.Object) -> None:
     settings = hole.umbra
     layout.prop(settings, "spin", slider=True)
     layout.prop(settings, "mass_scale")
-    layout.prop(settings, "motion")
+    layout.prop(settings, "motion", text="Motion")
     if settings.motion == CAMERA_ANIMATION:
         layout.prop(settings, "speed_of_light")
 
@@ -100,6 +100,7 @@ class VIEW3D_PT_umbra_sky(_Panel, bpy.types.Panel):
         if problem is not None:
             _draw_lines(layout, status.wrapped(problem, "ERROR"))
         group = find_setup(context.scene).group
+        layout.use_property_split = False  # the names are too long to stand beside their fields
         column = layout.column()
         column.active = settings.environment_source == "IMAGE"
         _draw_inputs(column, group, PLACEMENT_CONTROLS)
@@ -142,9 +143,7 @@ class OBJECT_PT_umbra(bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.object is not None and (
-            context.object.type == "EMPTY" or context.object.umbra.is_black_hole
-        )
+        return context.object is not None and (context.object.type == "EMPTY" or context.object.umbra.is_black_hole)
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(context.object.umbra, "is_black_hole", text="")

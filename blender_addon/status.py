@@ -13,7 +13,10 @@ from ._physics import metric, physics
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
 
-LINE_WIDTH = 44  # characters that a sidebar of ordinary width shows
+# How many characters a line of a panel shows: its width less margins and icon, over a character's mean width, in
+# pixels at an interface scale of 1.
+MARGIN, CHARACTER_WIDTH = 50.0, 6.0
+SHORTEST_LINE, ORDINARY_LINE = 20, 40
 
 # Seconds for which the number of maps in the folder is not counted anew.
 COUNT_INTERVAL = 1.0
@@ -28,9 +31,17 @@ class Line:
     icon: str = "NONE"
 
 
+def _line_width() -> int:
+    region = bpy.context.region
+    if region is None:
+        return ORDINARY_LINE
+    scale = bpy.context.preferences.system.ui_scale
+    return max(int((region.width / scale - MARGIN) / CHARACTER_WIDTH), SHORTEST_LINE)
+
+
 def wrapped(text: str, icon: str) -> tuple[Line, ...]:
-    """A sentence as lines, the icon in front of the first."""
-    parts = textwrap.wrap(text, LINE_WIDTH)
+    """A sentence as lines that fit the panel being drawn, the icon in front of the first."""
+    parts = textwrap.wrap(text, _line_width())
     return tuple(Line(part, icon if index == 0 else "BLANK1") for index, part in enumerate(parts))
 
 
