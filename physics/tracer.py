@@ -7,12 +7,13 @@ import enum
 import math
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boyer_lindquist import PrintedSystem
+from .closed_form import sky_directions
 from .errors import BlackHoleError, Cancelled
 from .mino import DirectRays, TurningRays
 from .observer import Observer
@@ -48,17 +49,32 @@ class Fate(enum.IntEnum):
     SHADOW = 2
 
 
+class Tracer(Protocol):
+    """What a method does with rays that come from the sky."""
+
+    def __call__(
+        self, rays: Rays, barrier: Barrier, tolerance: float, max_steps: int
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the unit vectors the rays come from, shape (n, 3), and which of them were resolved, shape (n,)."""
+
+
 @dataclass(frozen=True)
 class Method:
-    """A way to trace: equations of motion, and the Runge-Kutta pair that integrates them."""
+    """A way to trace."""
 
     name: str
-    tableau: Tableau
-    systems: Callable[[Rays, Barrier, float], list[tuple[NDArray[np.intp], System]]]
-    """Splits sky rays into the systems that trace them: (indices, system) pairs."""
+    label: str
+    """What an artist calls it."""
+    description: str
+    trace: Tracer
 
 
-def _mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
+Systems = Callable[[Rays, Barrier, float], list[tuple[NDArray[np.intp], System]]]
+"""Splits rays into the systems of equations that trace them: (indices, system) pairs."""
+
+
+def mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
+    """Return the regularised equations of motion for these rays."""
     turning = np.flatnonzero(barrier.blocks)
     direct = np.flatnonzero(~barrier.blocks)
     return [
@@ -67,20 +83,66 @@ def _mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[
     ]
 
 
-def _printed_system(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
+def printed_system(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
+    """Return Eq. 2 as printed for these rays."""
     return [(np.arange(len(rays)), PrintedSystem(rays, barrier, tolerance))]
 
+
+def stepping(tableau: Tableau, systems: Systems) -> Tracer:
+    """Return the tracer that integrates some equations of motion step by step with a Runge-Kutta pair."""
+
+    def trace(rays: Rays, barrier: Barrier, tolerance: float, max_steps: int) -> tuple[Array, NDArray[np.bool_]]:
+        direction = np.full((len(rays), 3), np.nan)
+        resolved = np.zeros(len(rays), dtype=bool)
+        for indices, system in systems(rays, barrier, tolerance):
+            outcome = _last(integrate(system, tableau, tolerance, max_steps))
+            resolved[indices] = outcome.reached
+            arrived = system.select(outcome.reached).sky_direction(outcome.state[:, outcome.reached])
+            direction[indices[outcome.reached]] = arrived
+        return direction, resolved
+
+    return trace
+
+
+def _without_steps(
+    rays: Rays, barrier: Barrier, tolerance: float, max_steps: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Trace by quadrature and closed forms; the few rays beyond their reach by Cash-Karp steps."""
+    direction, resolved = sky_directions(rays, barrier, tolerance)
+    rest = np.flatnonzero(~resolved)
+    if len(rest):
+        direction[rest], resolved[rest] = _by_cash_karp(rays.select(rest), barrier.select(rest), tolerance, max_steps)
+    return direction, resolved
+
+
+_by_cash_karp = stepping(CASH_KARP, mino_systems)
 
 METHODS = {
     method.name: method
     for method in (
-        Method("cash-karp", CASH_KARP, _mino_systems),
-        Method("cash-karp-printed", CASH_KARP, _printed_system),
+        Method(
+            "gauss-legendre",
+            "Fast",
+            "Radial motion by Gauss-Legendre quadrature, polar motion in closed form: exact like Reference, but faster",
+            _without_steps,
+        ),
+        Method(
+            "cash-karp",
+            "Reference",
+            "Geodesics in Mino time, integrated step by step with the Cash-Karp pair",
+            _by_cash_karp,
+        ),
+        Method(
+            "cash-karp-printed",
+            "Boyer-Lindquist",
+            "Geodesics as printed in the source paper: a check of the others. It cannot carry rays through the poles",
+            stepping(CASH_KARP, printed_system),
+        ),
     )
 }
-"""The methods by name: Cash-Karp on the Mino-time form, and on Eq. 2 as printed."""
+"""The methods by name."""
 
-DEFAULT_METHOD = "cash-karp"
+DEFAULT_METHOD = "gauss-legendre"
 
 
 @dataclass(frozen=True)
@@ -193,13 +255,9 @@ def trace_block(
     sky = np.flatnonzero(comes_from_sky(rays, barrier))
     fate = np.full(len(rays), Fate.SHADOW, dtype=np.uint8)
     direction = np.full((len(rays), 3), np.nan)
-    how = METHODS[method]
-    for indices, system in how.systems(rays.select(sky), barrier.select(sky), tolerance):
-        outcome = _last(integrate(system, how.tableau, tolerance, max_steps))
-        ray = sky[indices]
-        fate[ray] = np.where(outcome.reached, Fate.SKY, Fate.UNRESOLVED)
-        arrived = system.select(outcome.reached).sky_direction(outcome.state[:, outcome.reached])
-        direction[ray[outcome.reached]] = arrived
+    found, resolved = METHODS[method].trace(rays.select(sky), barrier.select(sky), tolerance, max_steps)
+    fate[sky] = np.where(resolved, Fate.SKY, Fate.UNRESOLVED)
+    direction[sky] = found
     return fate, direction
 
 

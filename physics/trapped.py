@@ -71,10 +71,10 @@ def find_barrier(rays: Rays) -> Barrier:
     with np.errstate(invalid="ignore", divide="ignore"):
         # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3); below -1 there is no minimum, and the formula, held at
         # -1, gives the inflection of R', sqrt(-A/3).
-        cosine = np.clip(-0.5 * constant / third**3, -1.0, 1.0)
+        cosine = np.maximum(-0.5 * constant / (third * third * third), -1.0)
         minimum = 2.0 * third * np.cos(np.arccos(cosine) / 3.0)
     radius = np.where(minimum > 1.0, minimum, 1.0)  # also where third = 0 made it NaN
-    exists = (4.0 * linear**3 + 27.0 * constant**2 <= 0.0) & (minimum > 1.0)
+    exists = (4.0 * linear * linear * linear + 27.0 * constant * constant <= 0.0) & (minimum > 1.0)
     square = radius * radius
     # R = r^4 + 2 A r^2 + 4 C r - a^2 q (Eq. 3 multiplied out) and its derivatives
     height = square * (square + 2.0 * linear) + 4.0 * constant * radius - a * a * rays.q

@@ -25,6 +25,7 @@ def compare(camera, **settings):
     return result, error, error / amplified, shift
 
 
+@pytest.mark.parametrize("method", ["gauss-legendre", "cash-karp"])
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize(
     # The promises: median error where float64 can resolve the ray, and error as an equivalent error of the
@@ -33,9 +34,9 @@ def compare(camera, **settings):
     [({}, 2e-6, 2e-5), ({"tolerance": 1e-11}, 1e-9, 1e-7)],
     ids=["default", "1e-11"],
 )
-def test_default_method_keeps_its_promises(name, settings, median, norm):
+def test_methods_keep_their_promises(name, settings, median, norm, method):
     camera = CAMERAS[name]
-    result, error, normed, shift = compare(camera, **settings)
+    result, error, normed, shift = compare(camera, method=method, **settings)
     resolvable = camera.rows["amp"][(result.fate == Fate.SKY) & ~camera.rows["shadow"]] < 1e6
     assert np.median(error[resolvable]) <= median
     assert normed.max() <= norm
@@ -46,15 +47,16 @@ def test_default_method_keeps_its_promises(name, settings, median, norm):
     assert result.counts["unresolved"] == 0
 
 
+@pytest.mark.parametrize("method", ["gauss-legendre", "cash-karp"])
 @pytest.mark.parametrize("name", CAMERAS)
-def test_rays_next_to_the_critical_curve_are_resolved_to_float64s_limit(name):
+def test_rays_next_to_the_critical_curve_are_resolved_to_float64s_limit(name, method):
     """Down to 1e-10 rad from the edge, where neighbouring rays part 1e10 times, errors stay those of rounding."""
     rows = CAMERAS[name].rows
-    _, error, _, _ = compare(CAMERAS[name], tolerance=1e-10)
+    _, error, _, _ = compare(CAMERAS[name], tolerance=1e-10, method=method)
     # An error of one rounding (1e-16) of the ray's direction, b and q, amplified; 1e3 roundings are allowed, and
-    # 1e-8 for the integration itself.
+    # 5e-8 for the integration itself.
     amp = rows["amp"][~rows["shadow"]]
-    assert (error <= 1e-13 * amp + 1e-8).all()
+    assert (error <= 1e-13 * amp + 5e-8).all()
 
 
 @pytest.mark.parametrize("name", CAMERAS)

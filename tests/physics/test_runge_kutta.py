@@ -116,13 +116,13 @@ def test_steps_that_run_out_leave_a_ray_unreached():
 
 
 def test_unresolved_rays_are_counted_and_carry_no_answer():
-    result = trace_rays(0.9, Observer.fido(10.0, 1.3, 0.0), *random_sky(500), max_steps=6)
+    result = trace_rays(0.9, Observer.fido(10.0, 1.3, 0.0), *random_sky(500), method="cash-karp", max_steps=6)
     given_up = result.fate == Fate.UNRESOLVED
     assert 0 < given_up.sum() == result.counts["unresolved"] < 500
     assert np.isnan(result.theta[given_up]).all()
     assert np.isnan(result.one_plus_z[given_up]).all()
     # More steps resolve them; fewer never change the answer of those that were resolved.
-    full = trace_rays(0.9, Observer.fido(10.0, 1.3, 0.0), *random_sky(500))
+    full = trace_rays(0.9, Observer.fido(10.0, 1.3, 0.0), *random_sky(500), method="cash-karp")
     assert full.counts["unresolved"] == 0
     sky = result.fate == Fate.SKY
     assert np.array_equal(full.theta[sky], result.theta[sky])
@@ -131,9 +131,9 @@ def test_unresolved_rays_are_counted_and_carry_no_answer():
 def test_another_table_traces_the_same_sky(monkeypatch):
     theta_rd, phi_rd = random_sky(1000)
     observer = Observer.circular_orbit(0.9, 8.0)
-    method = tracer.Method("dormand-prince", DORMAND_PRINCE, tracer.METHODS["cash-karp"].systems)
+    method = tracer.Method("dormand-prince", "", "", tracer.stepping(DORMAND_PRINCE, tracer.mino_systems))
     monkeypatch.setitem(tracer.METHODS, method.name, method)
-    one = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=1e-10)
+    one = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=1e-10, method="cash-karp")
     other = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=1e-10, method="dormand-prince")
     sky = one.fate == Fate.SKY
     assert np.array_equal(one.fate, other.fate)
@@ -145,11 +145,11 @@ def test_another_table_traces_the_same_sky(monkeypatch):
 def test_error_follows_the_tolerance():
     theta_rd, phi_rd = random_sky(300)
     observer = Observer.fido(10.0, 1.0, 0.0)
-    exact = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=1e-12)
+    exact = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=1e-12, method="cash-karp")
     sky = exact.fate == Fate.SKY
     previous = math.inf
     for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
-        result = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=tolerance)
+        result = trace_rays(0.9, observer, theta_rd, phi_rd, tolerance=tolerance, method="cash-karp")
         error = angle_between(unit_vectors(result.theta, result.phi), unit_vectors(exact.theta, exact.phi))[sky]
         assert np.median(error) < min(tolerance, previous / 10.0)
         previous = np.median(error)

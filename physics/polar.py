@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion of a ray's direction on the sphere over a given Mino time, in closed form.
+
+With v = cos(theta) and w = v^2, Eq. 3's Theta makes v'^2 = q - (q + b^2 - a^2) w - a^2 w^2 =
+(w_+ - w)(A + a^2 w), where w_+ = q / A and A is the larger root of A^2 - (q + b^2 - a^2) A - a^2 q = 0. Put
+v = sqrt(w_+) sin(chi): then chi' = s(w), s(w)^2 = A + a^2 w. In terms of chi the path is a great circle but
+for a slow turn about the axis. Taking the pole w = 1 out of the azimuth's rate b / (1 - w),
+
+    b / (1 - w) = s b / ((1 - w) s_1) + s f,   f = a^2 b / (s_1 s (s + s_1)),   s_1 = s(1),
+
+the first term is the azimuth along the great circle of inclination cos(i) = |b| / s_1, exactly, also through the
+poles, and f is smooth and small. So the ray's direction is n_0 cos(D) + t_0 sin(D), D = chi - chi_0, with the unit
+tangent t_0 = (theta' / s(w_0), b / (sin(theta_0) s_1)) on (theta-hat, phi-hat), turned about the axis by the
+integral of f over chi.
+
+D follows from the Mino time through lambda = integral of d chi / s. With M = A + a^2 w_+ / 2 and
+e = a^2 w_+ / (2 M), s^2 = M (1 - e cos(2 chi)), and 1 / s is a Fourier series whose coefficients fall like
+(e / 2)^k: e is at most a^2 / (2 L^2) for a ray of angular momentum L, 0.02 for one that skims a hole without spin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rays import Array, Rays
+
+# Rays are sorted by e into classes up to these, each with as many terms as its upper end needs, so that what becomes of
+# a ray does not depend on its company. Beyond the last the series is no longer a short one.
+ELLIPTICITY_CLASSES = (0.0, 0.01, 0.05, 0.3)
+MOST_TERMS = 12
+# Powers of e kept beyond the last harmonic: a harmonic k is made of the powers k, k + 2, ...
+EXTRA_POWERS = 2
+
+
+@dataclass(frozen=True)
+class PolarMotion:
+    """The constants of the motion for rays from one camera, backward; arrays of shape (n,)."""
+
+    spin: float
+    start: Array
+    """n_0, shape (3,)."""
+    v: float
+    """cos(theta_0)."""
+    tangent_theta: Array
+    tangent_phi: Array
+    """t_0 on the triad at the camera."""
+    frame: Array
+    """theta-hat and phi-hat at the camera, shape (2, 3)."""
+    base: Array
+    """A."""
+    pole_speed: Array
+    """s_1."""
+    b: Array
+    """The backward ray's angular momentum about the axis, -b."""
+    mean: Array
+    """M."""
+    ellipticity: Array
+    """e."""
+
+    @classmethod
+    def of(cls, rays: Rays) -> PolarMotion:
+        """Return the constants for `rays`."""
+        a, theta, phi = rays.spin, rays.observer.theta, rays.observer.phi
+        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
+        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
+        a2, w0 = a * a, cos_theta * cos_theta
+        reduced = rays.carter - a2
+        root = np.sqrt(np.maximum(reduced * reduced + 4.0 * a2 * rays.q, 0.0))
+        base = 0.5 * (reduced + root)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pole_speed = np.sqrt(base + a2)
+            tangent_theta = -rays.polar / np.sqrt(base + a2 * w0)
+            tangent_phi = -rays.azimuthal / pole_speed
+            # w_+ as the squared length of (v, v' / s), which has no cancellation
+            top = w0 + (sin_theta * tangent_theta) ** 2
+            mean = base + 0.5 * a2 * top
+            ellipticity = 0.5 * a2 * top / mean
+        return cls(
+            a,
+            np.array([sin_theta * cos_phi, sin_theta * sin_phi, cos_theta]),
+            cos_theta,
+            tangent_theta,
+            tangent_phi,
+            np.array([[cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta], [-sin_phi, cos_phi, 0.0]]),
+            base,
+            pole_speed,
+            -rays.b,
+            mean,
+            ellipticity,
+        )
+
+    def usable(self, tolerance: float) -> NDArray[np.bool_]:
+        """Return which rays the series serves to within `tolerance` radians, shape (n,); the rest have q < 0 or little
+        angular momentum."""
+        limit = min(ELLIPTICITY_CLASSES[-1], 2.0 * tolerance ** (1.0 / (MOST_TERMS + 1)))
+        usable: NDArray[np.bool_] = (self.base > 0.0) & (self.ellipticity >= 0.0) & (self.ellipticity <= limit)
+        return usable
+
+    def direction(self, mino_time: Array, rotation: Array, tolerance: float) -> Array:
+        """Return the unit vectors after `mino_time`, turned about the axis by `rotation` more, shape (3, n)."""
+        classes = np.searchsorted(ELLIPTICITY_CLASSES, self.ellipticity)
+        direction = np.empty((3, len(classes)))
+        for number, largest in enumerate(ELLIPTICITY_CLASSES):
+            members = np.flatnonzero(classes == number)
+            if len(members):
+                part = self.select(members)
+                direction[:, members] = part._direction(mino_time[members], rotation[members], largest, tolerance)
+        return direction
+
+    def select(self, chosen: NDArray[np.intp]) -> PolarMotion:
+        """Return the motion of the chosen rays alone."""
+        names = ("tangent_theta", "tangent_phi", "base", "pole_speed", "b", "mean", "ellipticity")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    def _direction(self, mino_time: Array, rotation: Array, largest: float, tolerance: float) -> Array:
+        """Return what `direction` does, for rays with e up to `largest`."""
+        v, a2 = self.v, self.spin * self.spin
+        vertical = self.frame[0, 2] * self.tangent_theta  # z component of t_0
+        swing = 0.5 * a2 / self.mean
+        coefficients = _speed_series(self.ellipticity, largest, tolerance)
+        even_start, odd_start = swing * (vertical * vertical - v * v), (2.0 * v) * swing * vertical
+        target = mino_time * np.sqrt(self.mean)
+        target += _harmonics(coefficients, even_start, odd_start)
+        angle = target / coefficients[0]
+        error = largest  # of the first guess; a round of Newton's method leaves about largest * error^2
+        while error > 0.1 * tolerance:
+            cos, sin = np.cos(angle), np.sin(angle)
+            height = v * cos + vertical * sin
+            rise = vertical * cos - v * sin
+            even = swing * (rise * rise - height * height)
+            excess = coefficients[0] * angle + _harmonics(coefficients, even, 2.0 * swing * rise * height)
+            excess -= target
+            excess *= np.sqrt(1.0 - even)
+            angle -= excess
+            error = largest * error * error
+        cos, sin = np.cos(angle), np.sin(angle)
+        turn = rotation
+        if a2 > 0.0:
+            height = v * cos + vertical * sin
+            rise = vertical * cos - v * sin
+            drift = _turn_series(self.pole_speed / np.sqrt(self.mean), self.ellipticity, len(coefficients))
+            path = drift[0] * angle
+            path += _harmonics(drift, swing * (rise * rise - height * height), 2.0 * swing * rise * height)
+            path -= _harmonics(drift, even_start, odd_start)
+            turn = rotation + path * (a2 * self.b / (self.pole_speed * self.mean))
+        along_theta, along_phi = self.tangent_theta * sin, self.tangent_phi * sin
+        x, y, z = (
+            self.start[i] * cos + self.frame[0, i] * along_theta + self.frame[1, i] * along_phi for i in range(3)
+        )
+        cos, sin = np.cos(turn), np.sin(turn)
+        return np.stack([x * cos - y * sin, x * sin + y * cos, z])
+
+
+def _speed_series(ellipticity: Array, largest: float, tolerance: float) -> list[Array]:
+    """Return the Fourier series of sqrt(M) / s = (1 - e cos x)^(-1/2), with as many terms as are needed."""
+    terms = 0
+    while terms < MOST_TERMS and (0.5 * largest) ** (terms + 1) > 0.1 * tolerance:
+        terms += 1
+    powers: list[float] = [1.0]
+    for m in range(1, terms + EXTRA_POWERS + 1):
+        powers.append(powers[-1] * (2 * m - 1) / (2 * m))
+    return _fourier(powers, ellipticity * ellipticity, terms)
+
+
+def _turn_series(pole_ratio: Array, ellipticity: Array, length: int) -> list[Array]:
+    """Return the Fourier series of M / (s (s + s_1)), s_1 / sqrt(M) = `pole_ratio`, with `length` terms.
+
+    With S = (1 - y)^(1/2), y = e cos x, it is the reciprocal of (1 - y) + pole_ratio S.
+    """
+    root, below = 1.0, [1.0 + pole_ratio]
+    for m in range(1, length + EXTRA_POWERS):
+        root *= (2 * m - 3) / (2 * m)
+        below.append(pole_ratio * root - (1.0 if m == 1 else 0.0))
+    inverse = 1.0 / below[0]
+    powers = [inverse]
+    for m in range(1, len(below)):
+        total = below[m] * powers[0]
+        for i in range(1, m):
+            total += below[m - i] * powers[i]
+        powers.append(-inverse * total)
+    return _fourier(powers, ellipticity * ellipticity, length - 1)
+
+
+def _fourier(powers: Sequence[Array | float], square: Array, terms: int) -> list[Array]:
+    """Return c_0 and c_k / e^k up to k = terms, of sum p_m (e cos x)^m = c_0 + sum c_k cos(k x); `square` is e^2.
+
+    cos^m x holds cos(k x) with weight 2^(1 - m) binom(m, (m - k) / 2), the constant with half of that.
+    """
+    series = []
+    for k in range(terms + 1):
+        total = np.zeros_like(square)
+        highest = len(powers) - 1
+        for m in range(highest - (highest - k) % 2, k - 1, -2):
+            weight = math.comb(m, (m - k) // 2) * (2.0 ** (1 - m) if k else 2.0**-m)
+            total *= square
+            total += powers[m] * weight
+        series.append(total)
+    return series
+
+
+def _harmonics(coefficients: list[Array], even: Array, odd: Array) -> Array:
+    """Return sum c_k sin(2 k chi) / (2 k) from even = e cos(2 chi), odd = e sin(2 chi)."""
+    total = np.zeros_like(even)
+    cos, sin = even, odd
+    for k in range(1, len(coefficients)):
+        total += coefficients[k] * sin * (0.5 / k)
+        cos, sin = cos * even - sin * odd, sin * even + cos * odd
+    return total
