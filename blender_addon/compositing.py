@@ -179,7 +179,8 @@ def _insert(scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.N
     if sky_node is None:
         sky_node = _add_image_node(tree, SKY, "Sky", group)
     _link(tree, map_node.outputs["Image"], group.inputs["Warp Map"])
-    _link(tree, sky_node.outputs["Image"], group.inputs["Environment"])
+    if not group.inputs["Environment"].is_linked:  # the artist may have a sky of other nodes there
+        _link(tree, sky_node.outputs["Image"], group.inputs["Environment"])
 
     if not group.inputs["Render"].is_linked:
         output = _output_node(tree)

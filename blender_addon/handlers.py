@@ -70,6 +70,8 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
+    if len(shot.holes(scene)) > 1:
+        messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
     _guarded(sync.sync_sky, scene)
 
 
@@ -138,7 +140,8 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
             raise SceneError(
                 "The warp map is missing or out of date: bake it, or switch on Bake When Rendering in the Umbra panel."
             )
-        print(f"Umbra: baking the warp map of frame {frame_shot.frame}", flush=True)
+        where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
+        print(f"Umbra: baking the warp map of frame {frame_shot.frame}{where}", flush=True)
         for _fraction in baking.bake_map(path, parameters):
             pass
     sync.point_at_maps(scene)

@@ -40,11 +40,19 @@ class MapFolder:
 
 def folder(scene: bpy.types.Scene) -> MapFolder:
     """The folder of a scene's maps; a temporary one if it should be beside a file not saved yet."""
-    chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
+    chosen = _chosen_folder(scene)
     if chosen.startswith("//") and not bpy.data.filepath:
         path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
         return MapFolder(str(path) + os.sep, path, True)
-    return MapFolder(chosen.rstrip("/\\") + "/", Path(bpy.path.abspath(chosen)), False)
+    return MapFolder(chosen, Path(bpy.path.abspath(chosen)), False)
+
+
+def _chosen_folder(scene: bpy.types.Scene) -> str:
+    """What the artist chose, ending in a slash; what is not absolute is meant beside the .blend file."""
+    chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
+    if not chosen.startswith("//") and not Path(chosen).is_absolute():
+        chosen = f"//{chosen}"
+    return chosen.rstrip("/\\") + "/"
 
 
 def stem(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int]) -> str:
@@ -169,7 +177,7 @@ def adopt(scene: bpy.types.Scene, blend_file: Path) -> str | None:
     source = folder(scene)
     if not source.is_temporary:
         return None
-    blender_path = (scene.umbra.map_folder.strip() or DEFAULT_FOLDER).rstrip("/\\") + "/"
+    blender_path = _chosen_folder(scene)
     target = blend_file.parent / blender_path.removeprefix("//")
     try:
         for path in sorted(source.path.glob(f"{bpy.path.clean_name(scene.name)}_*.exr")):

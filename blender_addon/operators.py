@@ -66,6 +66,9 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         hole.umbra.spin = self.spin
         hole.umbra.mass_scale = self.mass_scale
         context.collection.objects.link(hole)
+        if hole.name not in context.view_layer.objects:  # that collection is excluded here
+            context.collection.objects.unlink(hole)
+            scene.collection.objects.link(hole)
         for each in context.selected_objects:
             each.select_set(False)
         hole.select_set(True)
@@ -129,9 +132,7 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
 class UMBRA_OT_remove_compositor(bpy.types.Operator):
     bl_idname = "umbra.remove_compositor"
     bl_label = "Remove from Compositor"
-    bl_description = (
-        "Take the black hole out of the compositor again; links and settings are as they were before"
-    )
+    bl_description = "Take the black hole out of the compositor again; links and settings are as they were before"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -147,9 +148,7 @@ class UMBRA_OT_remove_compositor(bpy.types.Operator):
 class UMBRA_OT_use_star_sky(bpy.types.Operator):
     bl_idname = "umbra.use_star_sky"
     bl_label = "Sky of Real Stars"
-    bl_description = (
-        "Use the built-in sky: the real stars and the glow of the Milky Way, packed into this file"
-    )
+    bl_description = "Use the built-in sky: the real stars and the glow of the Milky Way, packed into this file"
     bl_options = {"REGISTER", "UNDO"}
 
     @reporting

@@ -32,8 +32,7 @@ METHOD_LABELS = {
     "cash-karp": ("Regularised", "Geodesics in Mino time: exact everywhere, also through the poles"),
     "cash-karp-printed": (
         "Boyer-Lindquist",
-        "Geodesics as printed in the source paper: a check of the other form. It cannot carry rays through "
-        "the poles",
+        "Geodesics as printed in the source paper: a check of the other form. It cannot carry rays through the poles",
     ),
 }
 
@@ -46,9 +45,7 @@ def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
     """
     hole = settings.id_data
     if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
-        hole.empty_display_size = max(
-            metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY
-        )
+        hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
 
 
 class UmbraHoleProperties(bpy.types.PropertyGroup):
@@ -139,6 +136,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         description="The black hole that is rendered; one a scene",
         type=bpy.types.Object,
         poll=_is_hole,
+        update=lambda settings, _context: _refresh(settings),
     )
     map_folder: bpy.props.StringProperty(
         name="Warp Maps",
@@ -147,6 +145,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         default="//umbra_maps/",
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        update=lambda settings, _context: _refresh(settings),
     )
     supersampling: bpy.props.EnumProperty(
         name="Samples",
@@ -158,6 +157,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
             ("4", "4 x 4", "Sixteen rays a pixel"),
         ),
         default="1",
+        update=lambda settings, _context: _refresh(settings),
         options=set(),
     )
     quality: bpy.props.EnumProperty(
@@ -223,7 +223,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 
 def _refresh(settings: UmbraSceneProperties) -> None:
-    """Carry a change of the sky into the compositor, where the set-up is in place."""
+    """Carry a change into the compositor, where the set-up is in place."""
     from . import sync  # it reads these properties, hence not at the top
 
     scene = settings.id_data

@@ -12,6 +12,7 @@ from . import baking, environment, maps, shot
 from ._physics import metric, physics
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
+from .sync import takes_sky_from_settings
 
 # How many characters a line of a panel shows: its width less margins and icon, over a character's mean width, in
 # pixels at an interface scale of 1.
@@ -47,6 +48,9 @@ def wrapped(text: str, icon: str) -> tuple[Line, ...]:
 
 def sky_problem(scene: bpy.types.Scene) -> str | None:
     """Why the sky cannot be read, if so."""
+    setup = find_setup(scene)
+    if setup is not None and not takes_sky_from_settings(setup):
+        return None
     try:
         environment.check_image(environment.read(scene).image)
     except physics.BlackHoleError as error:
@@ -71,9 +75,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     found += _place_lines(now)
     others = len(shot.holes(scene)) - 1
     if others > 0:
-        found += wrapped(
-            f"{others} more black hole{'s' if others > 1 else ''} in this scene: not rendered.", "INFO"
-        )
+        found += wrapped(f"{others} more black hole{'s' if others > 1 else ''} in this scene: not rendered.", "INFO")
     return tuple(found)
 
 

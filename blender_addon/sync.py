@@ -96,6 +96,12 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
         setup.map.image.reload()
 
 
+def takes_sky_from_settings(setup: Setup) -> bool:
+    """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
+    links = setup.group.inputs["Environment"].links
+    return setup.sky is not None and any(link.from_node == setup.sky for link in links)
+
+
 def sync_sky(scene: bpy.types.Scene) -> None:
     """Bring image, rotation and strength of the sky into the set-up.
 
@@ -108,7 +114,7 @@ def sync_sky(scene: bpy.types.Scene) -> None:
         There is no sky, or it cannot be read.
     """
     setup = find_setup(scene)
-    if setup is None or setup.sky is None:
+    if setup is None or not takes_sky_from_settings(setup):
         return
     sky = environment.read(scene)
     if setup.sky.image != sky.image:
@@ -147,9 +153,7 @@ def _follow(
             socket.default_value = (0.0, 0.0, 0.0) if is_vector else 1.0
         return
     wanted = [f"{path}[{index}]" for index in range(3)] if is_vector else [path]
-    if [
-        _driven_by(each, scene.world) for each in sorted(present, key=lambda each: each.array_index)
-    ] == wanted:
+    if [_driven_by(each, scene.world) for each in sorted(present, key=lambda each: each.array_index)] == wanted:
         return
     for each in present:
         animation.drivers.remove(each)

@@ -8,7 +8,7 @@ from types import ModuleType, SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scene_tools import add_hole, render, shrink
+from small_scene import add_hole, render, shrink
 
 
 @pytest.fixture

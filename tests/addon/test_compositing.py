@@ -7,7 +7,7 @@ from types import ModuleType
 
 import bpy
 import pytest
-from scene_tools import add_hole, compositor, environment_image, links_of, shrink, use_sky, world_sky
+from small_scene import add_hole, compositor, environment_image, links_of, shrink, use_sky, world_sky
 
 
 @pytest.fixture
@@ -290,3 +290,17 @@ def test_the_default_world_brings_the_real_stars(scene: bpy.types.Scene) -> None
     assert image.packed_file is not None
     assert image.filepath.startswith("//")
     assert math.isclose(image.pixels[3], 1.0)
+
+
+def test_a_sky_of_the_artists_own_nodes_stays(
+    scene: bpy.types.Scene, tree_module: ModuleType, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    setup = tree_module.find_setup(scene)
+    colour = setup.tree.nodes.new("CompositorNodeRGB")
+    setup.tree.links.new(colour.outputs[0], setup.group.inputs["Environment"])
+    bpy.ops.umbra.setup_compositor()
+    assert origin(setup.group.inputs["Environment"])[0] == colour
+    scene.umbra.environment_image = None
+    addon_module("sync").sync_sky(scene)  # nothing is missing
+    assert addon_module("status").sky_problem(scene) is None

@@ -8,11 +8,11 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from scene_tools import add_hole, render, run_python, shrink
+from small_scene import add_hole, render, run_python, shrink
 
 SCENE = """
 from pathlib import Path
-from scene_tools import add_hole, shrink
+from small_scene import add_hole, shrink
 folder = Path({folder!r})
 scene = bpy.context.scene
 shrink(scene)

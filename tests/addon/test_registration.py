@@ -7,7 +7,7 @@ from types import ModuleType
 import addon_utils
 import bpy
 import pytest
-from scene_tools import add_hole, run_python, shrink
+from small_scene import add_hole, run_python, shrink
 
 HANDLERS = (
     "render_init",
@@ -79,7 +79,7 @@ def test_disabling_and_enabling_keeps_a_scenes_settings(addon: ModuleType) -> No
 
 def test_blender_ends_without_help(addon: ModuleType) -> None:
     """Handlers left behind at the end make Blender 4.5 hang; a script must not have to care."""
-    result = run_python("from scene_tools import *\nshrink(bpy.context.scene)\nadd_hole(bpy.context.scene)\n")
+    result = run_python("from small_scene import *\nshrink(bpy.context.scene)\nadd_hole(bpy.context.scene)\n")
     assert result.returncode == 0, result.stderr
 
 

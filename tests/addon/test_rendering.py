@@ -9,7 +9,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from scene_tools import (
+from small_scene import (
     ROOT,
     add_hole,
     environment_image,
@@ -224,10 +224,30 @@ def test_the_worlds_rotation_and_strength(
         np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
 
 
+def wide_lens(scene: bpy.types.Scene) -> None:
+    data = scene.camera.data
+    data.lens, data.shift_x, data.shift_y = 12.0, 0.2, -0.15
+    scene.render.pixel_aspect_y = 1.4
+
+
+def panorama(scene: bpy.types.Scene) -> None:
+    data = scene.camera.data
+    data.type = "PANO"
+    owner = data if hasattr(data, "panorama_type") else data.cycles
+    owner.panorama_type = "EQUIRECTANGULAR"
+    owner.latitude_min, owner.latitude_max = -0.9, 1.3
+    owner.longitude_min, owner.longitude_max = -2.0, 2.5
+
+
+@pytest.mark.parametrize("change_camera", [wide_lens, panorama])
 def test_a_far_away_hole_shows_the_world_as_cycles_does(
-    scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType
+    scene: bpy.types.Scene,
+    tmp_path: Path,
+    exr: ModuleType,
+    change_camera: Callable[[bpy.types.Scene], None],
 ) -> None:
     """Mass towards 0: what is left is the World itself, rotation, strength and camera included."""
+    change_camera(scene)
     nodes = world_sky(scene, environment_image(environment_pixels(64)))
     nodes["mapping"].inputs["Rotation"].default_value = (0.4, -0.3, 1.2)
     nodes["background"].inputs["Strength"].default_value = 1.7

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
-from scene_tools import add_hole, shrink
+from small_scene import add_hole, shrink
 
 
 @pytest.fixture
