@@ -260,7 +260,7 @@ class BakeOperator:
         if summary.unresolved:
             self.report(
                 {"WARNING"},
-                f"{summary.unresolved} rays could not be resolved; the Regularised method resolves ray.",
+                f"{summary.unresolved} rays could not be resolved; choose another Method under Warp Maps.",
             )
 
 

@@ -28,14 +28,6 @@ MOTIONS = {
 
 TOLERANCES = {"DRAFT": 1e-4, "STANDARD": physics.DEFAULT_TOLERANCE, "REFERENCE": 1e-11}
 
-METHOD_LABELS = {
-    "cash-karp": ("Regularised", "Geodesics in Mino time: exact everywhere, also through the poles"),
-    "cash-karp-printed": (
-        "Boyer-Lindquist",
-        "Geodesics as printed in the source paper: a check of the other form. It cannot carry rays through the poles",
-    ),
-}
-
 
 def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
     """Draw the Empty's sphere at the size of the horizon.
@@ -162,7 +154,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     quality: bpy.props.EnumProperty(
         name="Accuracy",
-        description="Error allowed in one step of a ray's integration",
+        description="How exactly rays are traced: the error of direction allowed in each step",
         items=(
             ("DRAFT", "Draft", "1e-4 rad a step: quick, for trying things out"),
             (
@@ -178,7 +170,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Error allowed in one step of a ray's integration, radians",
+        description="Error of direction allowed in each step of tracing a ray, radians",
         default=physics.DEFAULT_TOLERANCE,
         min=1e-13,
         max=1e-2,
@@ -187,8 +179,8 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     method: bpy.props.EnumProperty(
         name="Method",
-        description="The form of the equations that is integrated",
-        items=tuple((name, *METHOD_LABELS.get(name, (name, ""))) for name in physics.METHODS),
+        description="How the rays are traced",
+        items=tuple((each.name, each.label, each.description) for each in physics.METHODS.values()),
         default=physics.DEFAULT_METHOD,
         options=set(),
     )
