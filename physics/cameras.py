@@ -107,15 +107,22 @@ class PerspectiveCamera:
         vectors /= np.sqrt(right * right + up * up + 1.0)[..., None]
         return vectors
 
-    def pixel(self, direction: Array) -> tuple[float, float] | None:
-        """Return the pixel coordinates where a direction, shape (3,), is seen; None behind the camera."""
-        if not direction[2] < 0.0:
-            return None
+    def component(self, x: ArrayLike, y: ArrayLike, vector: Array) -> Array:
+        """Return the component along `vector`, shape (3,), of the unit vectors seen at x, y, which may broadcast."""
         per_pixel, fitted, tall = self._scale()
-        right, up = -direction[0] / direction[2], -direction[1] / direction[2]
-        x = right / per_pixel + 0.5 * self.width - self.shift_x * fitted
-        y = 0.5 * self.height - (up / per_pixel - self.shift_y * fitted) / tall
-        return float(x), float(y)
+        right = (np.asarray(x, np.float64) - 0.5 * self.width + self.shift_x * fitted) * per_pixel
+        up = ((0.5 * self.height - np.asarray(y, np.float64)) * tall + self.shift_y * fitted) * per_pixel
+        along: Array = (vector[0] * right - vector[2]) + vector[1] * up
+        along /= np.sqrt((right * right + 1.0) + up * up)
+        return along
+
+    def pixels(self, directions: Array) -> tuple[Array, Array]:
+        """Return the pixel coordinates where directions, shape (n, 3), are seen, (n,) each; NaN behind the camera."""
+        per_pixel, fitted, tall = self._scale()
+        ahead = np.where(directions[:, 2] < 0.0, -directions[:, 2], np.nan)
+        x = directions[:, 0] / ahead / per_pixel + 0.5 * self.width - self.shift_x * fitted
+        y = 0.5 * self.height - (directions[:, 1] / ahead / per_pixel - self.shift_y * fitted) / tall
+        return x, y
 
     def _scale(self) -> tuple[float, float, float]:
         """Return the tangent per pixel width, the fitted side in pixel widths, and a pixel's height in widths."""
@@ -171,23 +178,33 @@ class PanoramaCamera:
     def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        longitude = self.longitude_min + (self.longitude_max - self.longitude_min) * x / self.width
-        latitude = self.latitude_max - (self.latitude_max - self.latitude_min) * y / self.height
+        longitude, latitude = self._angles(x, y)
         level = np.cos(latitude)
         return np.stack([level * np.sin(longitude), np.sin(latitude), -level * np.cos(longitude)], axis=-1)
 
-    def pixel(self, direction: Array) -> tuple[float, float] | None:
-        """Return the pixel coordinates where a direction, shape (3,), is seen; None outside the picture's range."""
-        longitude = math.atan2(direction[0], -direction[2])
-        latitude = math.atan2(direction[1], math.hypot(direction[0], direction[2]))
-        if not (
-            self.longitude_min <= longitude <= self.longitude_max
-            and self.latitude_min <= latitude <= self.latitude_max
-        ):
-            return None
+    def component(self, x: ArrayLike, y: ArrayLike, vector: Array) -> Array:
+        """Return the component along `vector`, shape (3,), of the unit vectors seen at x, y, which may broadcast."""
+        longitude, latitude = self._angles(x, y)
+        level = vector[0] * np.sin(longitude) - vector[2] * np.cos(longitude)
+        along: Array = np.cos(latitude) * level + vector[1] * np.sin(latitude)
+        return along
+
+    def pixels(self, directions: Array) -> tuple[Array, Array]:
+        """Return the pixel coordinates where directions, shape (n, 3), are seen, (n,) each; NaN outside the range."""
+        longitude = np.arctan2(directions[:, 0], -directions[:, 2])
+        latitude = np.arctan2(directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
+        seen = (self.longitude_min <= longitude) & (longitude <= self.longitude_max)
+        seen &= (self.latitude_min <= latitude) & (latitude <= self.latitude_max)
         x = (longitude - self.longitude_min) / (self.longitude_max - self.longitude_min) * self.width
         y = (self.latitude_max - latitude) / (self.latitude_max - self.latitude_min) * self.height
-        return x, y
+        return np.where(seen, x, np.nan), np.where(seen, y, np.nan)
+
+    def _angles(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Return longitude and latitude at pixel coordinates, in radians."""
+        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+        longitude = self.longitude_min + (self.longitude_max - self.longitude_min) * x / self.width
+        latitude = self.latitude_max - (self.latitude_max - self.latitude_min) * y / self.height
+        return longitude, latitude
 
 
 Camera = PerspectiveCamera | PanoramaCamera

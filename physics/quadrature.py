@@ -40,7 +40,10 @@ ERROR_FACTOR = 1.0
 # start next to the horizon, where psi' is large. Such rays are few, and some nodes more cost little.
 CROWDED_ERROR_FACTOR = 1e3
 
-# Newton rounds for a singularity's place, which only has to be good to a few per cent.
+# A singularity at this many times the interval's length, or none, is all the same.
+FAR_AWAY = 100.0
+
+# Rounds of iteration for a singularity's place, which only has to be good to a few per cent.
 ROOT_ROUNDS = 3
 
 # Where plain nodes would be more than this many, the substitution by sinh is worth its exponentials.
@@ -80,20 +83,13 @@ class _Integrand:
 def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array, Index]:
     """Return Mino time to infinity and psi, shape (n,), of rays with a turning point, and which need too many nodes."""
     start, turning, rates = turning_polynomial(rays, barrier)
-    # The roots of G next to 0 < s < 1, s_+ > 1 and s_- < 0: those of its first three terms, and Newton's method from
-    # the right for s_+, where the fourth counts.
-    g0, g1, g2, g3 = rates
+    # The root of G next to 0 < s on the left, from its first terms: next to the critical curve it is close to 0.
+    g0, g1, g2, _ = rates
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(g1 * g1 - 4.0 * g0 * g2, 0.0))
-        half = -0.5 * (g1 + np.copysign(root, g1))
-        one, other = g0 / half, half / g2
-        rising = g1 > 0.0
-        beyond = np.where(rising, other, one)
-        for _ in range(ROOT_ROUNDS):
-            value = g0 + beyond * (g1 + beyond * (g2 + beyond * g3))
-            beyond = beyond - value / (g1 + beyond * (2.0 * g2 + 3.0 * beyond * g3))
-        far = np.sqrt(np.maximum(beyond, 1.0))
-        near = np.sqrt(np.where(rising, -one, np.abs(other)))
+        near = np.sqrt(np.where(g1 > 0.0, 2.0 * g0 / (g1 + root), FAR_AWAY))
+    near = np.minimum(near, FAR_AWAY)
+    far = np.sqrt(1.0 + _negative_root(rays) / turning)
     horizon = np.sqrt(1.0 / (horizon_radius(rays.spin) * turning) - 1.0)
     integrand = _Integrand(rays.spin, rays.b, rates, np.square, turning, start, near, far, horizon)
     goal, crowded_goal = _goals(tolerance)
@@ -111,19 +107,24 @@ def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Ar
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.abs(0.25 * rates[0] / rates[1:])
         near = np.minimum(np.minimum(shares[0], np.sqrt(shares[1])), np.cbrt(shares[2]))
-        near = np.minimum(near, np.sqrt(np.sqrt(shares[3])))
-        # The root at negative u: 1 = u^2 (-c_2 + c_3 |u| - c_4 u^2), a few rounds of fixed point.
-        c2, c3, c4 = radial_polynomial(rays)
-        negative = 1.0 / (np.sqrt(np.maximum(-c2, 0.0)) + np.cbrt(c3))
-        for _ in range(3):
-            negative = 1.0 / np.sqrt(np.maximum(-c2 + negative * (c3 - c4 * negative), 0.0))
-        far = 1.0 + negative / unit
+        near = np.minimum(np.minimum(near, np.sqrt(np.sqrt(shares[3]))), FAR_AWAY)
+    far = 1.0 + _negative_root(rays) / unit
     horizon = 1.0 / (horizon_radius(rays.spin) * unit) - 1.0
     integrand = _Integrand(rays.spin, rays.b, rates, np.positive, unit, start, near, far, horizon)
     _, crowded_goal = _goals(tolerance)
     axes = np.minimum(_imaginary(near, start), _real(far, start))
     axes = np.minimum(axes, 1.0 + start + 2.0 * horizon)
     return _integrals(integrand, _nodes(crowded_goal, axes / (1.0 - start)), crowded_goal)
+
+
+def _negative_root(rays: Rays) -> Array:
+    """Return -u at U's negative root, shape (n,): 1 = u^2 (-c_2 + c_3 |u| - c_4 u^2), by fixed point."""
+    c2, c3, c4 = radial_polynomial(rays)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root: Array = 1.0 / (np.sqrt(np.maximum(-c2, 0.0)) + np.cbrt(c3))
+        for _ in range(ROOT_ROUNDS):
+            root = 1.0 / np.sqrt(np.maximum(-c2 + root * (c3 - c4 * root), 0.0))
+    return root
 
 
 def _goals(tolerance: float) -> tuple[float, float]:

@@ -122,6 +122,22 @@ def rays_from_triad(spin: float, observer: Observer, looking: Array) -> Rays:
     return rays_from_camera(spin, observer, looking @ camera_triad(observer).T)
 
 
+def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
+    """Return c_0 and c, shape (3,), with 1 + z = c_0 + c . N for every ray of the camera, N on (r, theta, phi)-hat.
+
+    Eqs. 5, 7 and 13 put together: the Doppler factor times alpha + omega varpi n_phi, in which the denominator of
+    Eq. 5 cancels.
+    """
+    metric = metric_functions(spin, observer.r, observer.theta)
+    e_x, e_y, e_z = camera_triad(observer)
+    beta = observer.beta
+    gamma = 1.0 / math.sqrt((1.0 - beta) * (1.0 + beta))
+    drag = metric.omega * metric.varpi
+    constant = gamma * (metric.alpha + drag * e_y[2] * beta)
+    on_x, on_y, on_z = -drag * e_x[2], -gamma * (metric.alpha * beta + drag * e_y[2]), -drag * e_z[2]
+    return constant, on_x * e_x + on_y * e_y + on_z * e_z
+
+
 def _light_in_fido_frame(beta: float, directions: Array) -> tuple[Array, Array]:
     """Return the Doppler factor of Eq. 13 and the light's direction of Eq. 5 on (e_x, e_y, e_z)."""
     gamma_inverse = math.sqrt((1.0 - beta) * (1.0 + beta))

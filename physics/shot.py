@@ -27,6 +27,10 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 MOTIONS = ("fido", "static", "circular", "circular_retrograde", "free_fall", "velocity")
 SUPERSAMPLING = (1, 2, 4)
 
+# Error of direction allowed to interpolation, radians: a texel of a sky 8192 pixels wide has 8e-4.
+DEFAULT_INTERPOLATION = 2e-6
+LARGEST_INTERPOLATION = 1e-2
+
 # Rotations that come from single-precision matrices are orthonormal to about this.
 ROTATION_TOLERANCE = 1e-4
 
@@ -57,6 +61,8 @@ class WarpMapParameters:
         Map pixels along each side of a picture's pixel.
     tolerance, method
         As for `trace_rays`.
+    interpolation : float
+        Error of direction allowed where neighbouring rays are interpolated, radians; 0 traces every pixel.
     """
 
     spin: float
@@ -69,6 +75,7 @@ class WarpMapParameters:
     supersampling: int = 1
     tolerance: float = DEFAULT_TOLERANCE
     method: str = DEFAULT_METHOD
+    interpolation: float = DEFAULT_INTERPOLATION
 
     def __post_init__(self) -> None:
         for name in ("camera_position", "velocity"):
@@ -81,6 +88,11 @@ class WarpMapParameters:
         """Raise BlackHoleError, with a sentence for the user, when no map can be made from these parameters."""
         check_spin(self.spin)
         check_settings(self.tolerance, self.method)
+        if not 0.0 <= self.interpolation <= LARGEST_INTERPOLATION:
+            raise BlackHoleError(
+                f"The interpolation error is {self.interpolation:g}; give it a value between 0 (every pixel is traced) "
+                f"and {LARGEST_INTERPOLATION:g} radians."
+            )
         if self.supersampling not in SUPERSAMPLING:
             raise BlackHoleError(f"The supersampling is {self.supersampling}; choose 1, 2 or 4.")
         if not all(math.isfinite(value) for value in (*self.camera_position, *self.velocity)):

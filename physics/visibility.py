@@ -40,32 +40,32 @@ EdgeFunction = Callable[[Array, Array], Array]
 
 
 def near_edge(corners: Array) -> NDArray[np.bool_]:
-    """Return the pixels that the edge may touch, shape (height, width), from corner values (height + 1, width + 1).
+    """Return the pixels that the edge may touch, shape (..., h, w), from corner values, shape (..., h + 1, w + 1).
 
     Those whose corners differ in sign, and their neighbours: the edge may bulge into a pixel through one side.
     """
     sky = corners > 0.0
-    touched = sky[:-1, :-1] ^ sky[1:, 1:]
-    touched |= sky[:-1, :-1] ^ sky[:-1, 1:]
-    touched |= sky[:-1, :-1] ^ sky[1:, :-1]
+    touched = sky[..., :-1, :-1] ^ sky[..., 1:, 1:]
+    touched |= sky[..., :-1, :-1] ^ sky[..., :-1, 1:]
+    touched |= sky[..., :-1, :-1] ^ sky[..., 1:, :-1]
     grown = touched.copy()
-    grown[1:] |= touched[:-1]
-    grown[:-1] |= touched[1:]
+    grown[..., 1:, :] |= touched[..., :-1, :]
+    grown[..., :-1, :] |= touched[..., 1:, :]
     wide = grown.copy()
-    wide[:, 1:] |= grown[:, :-1]
-    wide[:, :-1] |= grown[:, 1:]
+    wide[..., 1:] |= grown[..., :-1]
+    wide[..., :-1] |= grown[..., 1:]
     return wide
 
 
 def centre_block(
-    centre: tuple[float, float] | None, first_row: int, last_row: int, width: int
+    centre: tuple[float, float] | None, width: int, height: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the pixels around the one that sees the hole's centre, as columns and rows, within a strip of rows."""
+    """Return the columns and rows of the pixels around the one that sees the hole's centre, those in the picture."""
     if centre is None or not (abs(centre[0]) < 1e9 and abs(centre[1]) < 1e9):
         return np.empty(0, np.intp), np.empty(0, np.intp)
     column, row = int(np.floor(centre[0])), int(np.floor(centre[1]))
     columns = np.arange(max(column - CENTRE_REACH, 0), min(column + CENTRE_REACH + 1, width))
-    rows = np.arange(max(row - CENTRE_REACH, first_row), min(row + CENTRE_REACH + 1, last_row))
+    rows = np.arange(max(row - CENTRE_REACH, 0), min(row + CENTRE_REACH + 1, height))
     grid_column, grid_row = np.meshgrid(columns, rows)
     return grid_column.ravel(), grid_row.ravel()
 

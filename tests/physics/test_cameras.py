@@ -82,10 +82,14 @@ def test_partial_panorama():
         PanoramaCamera(300, 100, latitude_max=1.0),
     ],
 )
-def test_pixel_is_the_inverse_of_directions(camera):
+def test_pixels_are_the_inverse_of_directions(camera):
     random = np.random.default_rng(0)
-    for x, y in random.uniform((0.0, 0.0), (camera.width, camera.height), (20, 2)):
-        assert camera.pixel(camera.directions(x, y)) == pytest.approx((x, y), abs=1e-9)
+    x, y = random.uniform((0.0, 0.0), (camera.width, camera.height), (20, 2)).T
+    seen_x, seen_y = camera.pixels(camera.directions(x, y))
+    assert seen_x == pytest.approx(x, abs=1e-9)
+    assert seen_y == pytest.approx(y, abs=1e-9)
+    vector = np.array([0.3, -0.5, 0.8])
+    assert camera.component(x, y, vector) == pytest.approx(camera.directions(x, y) @ vector, abs=1e-14)
 
 
 def test_directions_are_unit_vectors_of_the_pixels_shape():

@@ -19,10 +19,10 @@ from physics import (
     bake,
     bake_steps,
     looking_at_hole,
+    painting,
     trace_rays,
     unstable_orbit_warning,
 )
-from physics import warp_map as warp_map_module
 
 
 def turned(axis, angle):
@@ -156,23 +156,27 @@ def test_partly_covered_pixels_carry_a_direction_from_their_visible_part():
 
 def test_counts_add_up():
     warp_map = bake(shot())
-    assert sum(warp_map.counts.values()) == 48 * 27
+    assert sum(warp_map.counts[name] for name in ("sky", "edge", "shadow", "unresolved")) == 48 * 27
+    assert warp_map.counts["rays"] > 0
     assert warp_map.counts["unresolved"] == 0
     assert warp_map.counts["edge"] == ((warp_map.visibility > 0.0) & (warp_map.visibility < 1.0)).sum()
 
 
 def test_unresolved_pixels_are_marked_and_counted():
     """Eq. 2 as printed cannot carry rays through the poles: such pixels hold 1 + z = -1, which no sky has."""
-    warp_map = bake(shot(inclination=20.0, radius=15.0, spin=0.5, method="cash-karp-printed", motion="fido"))
+    pole = {"inclination": 20.0, "radius": 15.0, "spin": 0.5, "motion": "fido"}
+    warp_map = bake(shot(**pole, method="cash-karp-printed", interpolation=0.0))
     lost = warp_map.one_plus_z == -1.0
     assert 0 < lost.sum() == warp_map.counts["unresolved"] < 200
 
 
-def test_strips_and_blocks_make_no_difference(monkeypatch):
-    whole = bake(shot())
-    monkeypatch.setattr(warp_map_module, "STRIP_PIXELS", 100)
-    monkeypatch.setattr(warp_map_module, "BLOCK_SIZE", 17)
-    pieces = bake(shot())
+@pytest.mark.parametrize("interpolation", [0.0, 2e-6])
+def test_groups_and_blocks_make_no_difference(monkeypatch, interpolation):
+    whole = bake(shot(interpolation=interpolation))
+    monkeypatch.setattr(painting, "GROUP_PIXELS", 100)
+    monkeypatch.setattr(painting, "BLOCK_SIZE", 17)
+    monkeypatch.setattr(painting, "TRACED_SIDE", 16)
+    pieces = bake(shot(interpolation=interpolation))
     for name in ("theta", "phi", "one_plus_z", "visibility"):
         assert np.array_equal(getattr(whole, name), getattr(pieces, name)), name
 
@@ -203,6 +207,7 @@ def test_hash_holds_exactly_while_nothing_changes():
         "supersampling": 2,
         "tolerance": 1e-7,
         "method": "cash-karp-printed",
+        "interpolation": 0.0,
     }
     assert set(changes) == {field.name for field in dataclasses.fields(WarpMapParameters)}
     hashes = {dataclasses.replace(base, **{name: value}).hash for name, value in changes.items()}
@@ -228,6 +233,8 @@ def test_parameters_survive_the_metadata():
         ({"supersampling": 3}, "supersampling"),
         ({"tolerance": 1.0}, "tolerance"),
         ({"method": "guess"}, "no method"),
+        ({"interpolation": -1e-6}, "interpolation"),
+        ({"interpolation": math.nan}, "interpolation"),
         ({"camera_to_hole": ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))}, "not a rotation"),
         ({"hole_to_world": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))}, "not a rotation"),
     ],

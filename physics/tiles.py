@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Adaptive sampling: where the lensed sky is smooth, a few rays stand for a tile of pixels.
+
+The direction that a pixel's light comes from is a smooth function of the pixel except at the shadow's edge, where it
+oscillates without end. A tile away from the edge is sampled at n x n Chebyshev points; its unit vectors are
+interpolated by a polynomial of degree n - 1 in each coordinate (never the angles, which jump at the seam and at the
+poles). The highest coefficients tell the error: for an analytic function they fall geometrically, and what is left out
+is about as large as the last that is kept (Trefethen 2013, Approximation Theory and Approximation Practice, ch. 8).
+Tiles that the edge touches, or that fail, are divided, down to tiles whose every pixel is traced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rays import Array
+
+# Sides of the tiles in pixels, each half of the one before; the pixels of the last are traced one by one.
+TILE_SIDES = (128, 64, 32, 16)
+
+# Chebyshev points along each side of a tile, and how many of the highest coefficients tell the error.
+POINTS = 11
+TAIL = 2
+
+Directions = Callable[[Array, Array], Array]
+"""From pixel coordinates, shape (n,), to unit vectors in the sky, shape (n, 3); NaN where there is none."""
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Square tiles of one size, by their top left pixels; the last of a row or column may stick out of the picture."""
+
+    side: int
+    column: NDArray[np.intp]
+    row: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.column)
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Tiles:
+        """Return the chosen tiles alone."""
+        return Tiles(self.side, self.column[chosen], self.row[chosen])
+
+    def divided(self) -> Tiles:
+        """Return the four quarters of each tile."""
+        half = self.side // 2
+        steps = np.array([(0, 0), (0, half), (half, 0), (half, half)])
+        column = (self.column[:, None] + steps[:, 1]).ravel()
+        row = (self.row[:, None] + steps[:, 0]).ravel()
+        return Tiles(half, column, row)
+
+    def pixels(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the columns, shape (n, 1, side), and rows, shape (n, side, 1), of the tiles' pixels."""
+        steps = np.arange(self.side)
+        return self.column[:, None, None] + steps, self.row[:, None, None] + steps[:, None]
+
+    def within(self, width: int, height: int) -> Tiles:
+        """Return the tiles that hold any pixel of the picture."""
+        return self.select((self.column < width) & (self.row < height))
+
+
+def tiles_of(width: int, height: int, side: int = TILE_SIDES[0]) -> Tiles:
+    """Return the tiles of one size that cover a picture."""
+    row, column = np.mgrid[0:height:side, 0:width:side]
+    return Tiles(side, column.ravel(), row.ravel())
+
+
+def _points(count: int) -> Array:
+    """Chebyshev points of the first kind on (0, 1), shape (count,)."""
+    points: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    return points
+
+
+def _to_coefficients(count: int) -> Array:
+    """The matrix from values at Chebyshev points to Chebyshev coefficients, shape (count, count)."""
+    order, point = np.mgrid[0:count, 0:count]
+    matrix: Array = np.cos(np.pi * order * (count - 0.5 - point) / count) * (2.0 / count)
+    matrix[0] *= 0.5
+    return matrix
+
+
+def _at_pixels(side: int, count: int) -> Array:
+    """The Chebyshev polynomials at the pixel centres of a tile, shape (side, count)."""
+    place = 2.0 * (np.arange(side) + 0.5) / side - 1.0
+    polynomials: Array = np.cos(np.arange(count) * np.arccos(place)[:, None])
+    return polynomials
+
+
+_PLACES = _points(POINTS)
+_COEFFICIENTS = _to_coefficients(POINTS)
+
+
+def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Sample tiles and judge whether the samples determine them.
+
+    Returns
+    -------
+    coefficients : ndarray, shape (n, 3, POINTS, POINTS)
+        Chebyshev coefficients of x, y, z by row and column.
+    good : ndarray of bool, shape (n,)
+        Whether the interpolation's error is below `tolerance` radians; false where any sample sees no sky.
+    """
+    x = tiles.column[:, None, None] + tiles.side * _PLACES[None, None, :]
+    y = tiles.row[:, None, None] + tiles.side * _PLACES[None, :, None]
+    x, y = np.broadcast_arrays(x, y)
+    values = directions(x.ravel(), y.ravel()).reshape(len(tiles), POINTS, POINTS, 3)
+    coefficients = _COEFFICIENTS @ np.moveaxis(values, -1, 1) @ _COEFFICIENTS.T
+    size = np.abs(coefficients)
+    rest = size[:, :, -TAIL:, :].sum(axis=(1, 2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(1, 2, 3))
+    return coefficients, rest < tolerance  # NaN: False
+
+
+def interpolate(coefficients: Array, side: int, rotation: Array) -> Array:
+    """Return the unit vectors at the pixels of tiles, turned by `rotation`, shape (n, 3, side, side)."""
+    vectors = _at_pixels(side, POINTS)
+    turned = np.tensordot(rotation, coefficients, axes=(1, 1)).transpose(1, 0, 2, 3)
+    values: Array = vectors @ turned @ vectors.T
+    return values

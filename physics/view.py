@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One map's camera: from map pixels to rays, and what is known of the picture before any ray is traced."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .observer import Observer
+from .rays import Array, Rays, rays_from_triad, redshift_vector
+from .shot import WarpMapParameters, spherical_triad
+from .tracer import BLOCK_SIZE
+from .trapped import edge_function
+
+# Points on the shadow's outline. Chords between them stray from it by (2 pi / n)^2 / 8 of its radius of curvature:
+# 1e-6, less than a pixel of any picture that fits into memory.
+OUTLINE_POINTS = 2048
+OUTLINE_ROUNDS = 45  # of bisection: to float64's resolution
+
+
+class View:
+    """The camera of one map as a function from map pixels to rays.
+
+    Pixel coordinates are those of the map, supersampling included, from its top left corner.
+    """
+
+    def __init__(self, parameters: WarpMapParameters) -> None:
+        self._spin = parameters.spin
+        self._camera = parameters.camera
+        self._per_pixel = 1.0 / parameters.supersampling
+        self._observer = parameters.observer()
+        triad = spherical_triad(self._observer.theta, self._observer.phi)
+        self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
+        self.hole_to_world = np.array(parameters.hole_to_world)
+
+    def rays(self, x: Array, y: Array) -> Rays:
+        """Return the rays seen at map pixel coordinates x, y, shape (n,)."""
+        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        return rays_from_triad(self._spin, self._observer, seen @ self._camera_to_triad)
+
+    def edge(self, x: Array, y: Array) -> Array:
+        """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""
+        shape, x, y = x.shape, x.ravel(), y.ravel()
+        values = np.empty(x.shape)
+        for start in range(0, len(x), BLOCK_SIZE):
+            block = slice(start, start + BLOCK_SIZE)
+            values[block] = edge_function(self.rays(x[block], y[block]))
+        return values.reshape(shape)
+
+    def one_plus_z(self, x: Array, y: Array) -> Array:
+        """Return 1 + z of the sky at map pixel coordinates, which may broadcast: Eq. 13 alone, without tracing."""
+        constant, vector = redshift_vector(self._spin, self._observer)
+        along = self._camera.component(x * self._per_pixel, y * self._per_pixel, self._camera_to_triad @ vector)
+        return constant + along
+
+    def centre(self) -> tuple[float, float] | None:
+        """Return the map pixel coordinates where the camera sees light that comes from the hole's direction."""
+        x, y = self._pixels(np.array([[-1.0, 0.0, 0.0]]))
+        return None if np.isnan(x[0]) else (float(x[0]), float(y[0]))
+
+    def outline(self) -> tuple[Array, Array]:
+        """Return map pixel coordinates along the shadow's edge, in order, shape (n,); NaN where not in view.
+
+        In the FIDO's sky the shadow surrounds the hole's direction, and each great circle from there to the
+        opposite point, which is sky, crosses its edge once.
+        """
+        turn = np.arange(OUTLINE_POINTS) * (2.0 * math.pi / OUTLINE_POINTS)
+        fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
+
+        def looking(angle: Array) -> Array:
+            return np.stack([-np.cos(angle), np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn)], axis=-1)
+
+        low, high = np.zeros(OUTLINE_POINTS), np.full(OUTLINE_POINTS, math.pi)
+        for _ in range(OUTLINE_ROUNDS):
+            middle = 0.5 * (low + high)
+            sky = edge_function(rays_from_triad(self._spin, fido, looking(middle))) > 0.0
+            low, high = np.where(sky, low, middle), np.where(sky, middle, high)
+        return self._pixels(looking(high))
+
+    def _pixels(self, looking: Array) -> tuple[Array, Array]:
+        """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""
+        beta, motion = self._observer.beta, np.array(self._observer.direction)
+        along = looking @ motion
+        # Eq. 5 turned round: the component along the motion becomes (cos + beta) / (1 + beta cos).
+        across = looking - along[:, None] * motion
+        seen = math.sqrt(1.0 - beta * beta) * across + (along + beta)[:, None] * motion
+        seen /= (1.0 + beta * along)[:, None]
+        x, y = self._camera.pixels(seen @ self._camera_to_triad.T)
+        return x / self._per_pixel, y / self._per_pixel
+
+
