@@ -129,6 +129,7 @@ class VIEW3D_PT_umbra_maps(_Panel, bpy.types.Panel):
         layout.prop(settings, "quality")
         if settings.quality == "CUSTOM":
             layout.prop(settings, "tolerance")
+            layout.prop(settings, "interpolation")
         layout.prop(settings, "method")
         if find_setup(context.scene) is not None:
             layout.operator("umbra.setup_compositor", text="Update Compositor", icon="FILE_REFRESH")

@@ -26,7 +26,15 @@ MOTIONS = {
     CAMERA_ANIMATION: "velocity",
 }
 
-TOLERANCES = {"DRAFT": 1e-4, "STANDARD": physics.DEFAULT_TOLERANCE, "REFERENCE": 1e-11}
+# Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
+ACCURACIES = {
+    "DRAFT": (1e-4, 1e-4),
+    "STANDARD": (physics.DEFAULT_TOLERANCE, physics.DEFAULT_INTERPOLATION),
+    "REFERENCE": (1e-11, 0.0),
+}
+
+# Blender saves an enum's number, so a method keeps the one it has here.
+METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
 
 
 def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
@@ -154,25 +162,35 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     quality: bpy.props.EnumProperty(
         name="Accuracy",
-        description="How exactly rays are traced: the error of direction allowed in each step",
+        description="How exactly the map is made: the error of direction allowed",
         items=(
-            ("DRAFT", "Draft", "1e-4 rad a step: quick, for trying things out"),
+            ("DRAFT", "Draft", "1e-4 radians, a tenth of a pixel or so: for trying things out"),
             (
                 "STANDARD",
                 "Standard",
-                f"{physics.DEFAULT_TOLERANCE:g} rad a step: exact to a small share of a pixel",
+                f"{physics.DEFAULT_INTERPOLATION:g} radians, a hundredth of a pixel or less: for final pictures",
             ),
-            ("REFERENCE", "Reference", "1e-11 rad a step: as exact as the arithmetic allows"),
-            ("CUSTOM", "Custom", "A tolerance of your own"),
+            ("REFERENCE", "Reference", "Every pixel is traced, as exactly as the arithmetic allows: slow"),
+            ("CUSTOM", "Custom", "Tolerances of your own"),
         ),
         default="STANDARD",
         options=set(),
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Error of direction allowed in each step of tracing a ray, radians",
+        description="Error of direction allowed to the tracing of a ray, radians",
         default=physics.DEFAULT_TOLERANCE,
         min=1e-13,
+        max=1e-2,
+        precision=10,
+        options=set(),
+    )
+    interpolation: bpy.props.FloatProperty(
+        name="Interpolation",
+        description="Error of direction allowed where the sky is smooth and rays are interpolated, radians. "
+        "0 traces every pixel",
+        default=physics.DEFAULT_INTERPOLATION,
+        min=0.0,
         max=1e-2,
         precision=10,
         options=set(),
@@ -180,7 +198,9 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     method: bpy.props.EnumProperty(
         name="Method",
         description="How the rays are traced",
-        items=tuple((each.name, each.label, each.description) for each in physics.METHODS.values()),
+        items=tuple(
+            (each.name, each.label, each.description, METHOD_NUMBERS[each.name]) for each in physics.METHODS.values()
+        ),
         default=physics.DEFAULT_METHOD,
         options=set(),
     )
@@ -223,9 +243,9 @@ def _refresh(settings: UmbraSceneProperties) -> None:
         sync.refresh(scene)
 
 
-def tolerance_of(settings: UmbraSceneProperties) -> float:
-    """The error allowed in one step, radians, from the chosen accuracy."""
-    return TOLERANCES.get(settings.quality, settings.tolerance)
+def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:
+    """The errors of direction allowed to tracing and to interpolation, radians, from the chosen accuracy."""
+    return ACCURACIES.get(settings.quality, (settings.tolerance, settings.interpolation))
 
 
 CLASSES = (UmbraHoleProperties, UmbraSceneProperties)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ._physics import physics
 from .errors import SceneError
-from .properties import CAMERA_ANIMATION, MOTIONS, tolerance_of
+from .properties import CAMERA_ANIMATION, MOTIONS, tolerances_of
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -340,6 +340,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
             )
 
     settings = scene.umbra
+    tolerance, interpolation = tolerances_of(settings)
     position = world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m
     parameters = physics.WarpMapParameters(
         spin=float(hole_settings.spin),
@@ -350,8 +351,9 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         motion=MOTIONS[hole_settings.motion],
         velocity=tuple(float(value) for value in speed),
         supersampling=int(settings.supersampling),
-        tolerance=float(tolerance_of(settings)),
+        tolerance=tolerance,
         method=settings.method,
+        interpolation=interpolation,
     )
     parameters.validate()
     return Shot(scene.frame_current, hole.name, parameters)

@@ -87,7 +87,7 @@ def _map_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
         found += wrapped("This frame's warp map is not baked.", "RADIOBUT_OFF")
     elif shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
         found += wrapped("This frame's warp map is baked; rendering checks it.", "CHECKMARK")
-    elif maps.is_fresh(path, now.parameters):
+    elif maps.is_fresh(path, now.parameters, thorough=False):
         found += wrapped("This frame's warp map is up to date.", "CHECKMARK")
     else:
         found += wrapped("This frame's warp map is out of date.", "FILE_REFRESH")

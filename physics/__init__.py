@@ -4,12 +4,20 @@
 from .cameras import PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
-from .shot import MOTIONS, SUPERSAMPLING, WarpMapParameters, looking_at_hole, unstable_orbit_warning
+from .shot import (
+    DEFAULT_INTERPOLATION,
+    MOTIONS,
+    SUPERSAMPLING,
+    WarpMapParameters,
+    looking_at_hole,
+    unstable_orbit_warning,
+)
 from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS, Fate, TraceResult, trace_rays
 from .warp_map import WarpMap, bake, bake_steps
 from .warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
 
 __all__ = [
+    "DEFAULT_INTERPOLATION",
     "DEFAULT_METHOD",
     "DEFAULT_TOLERANCE",
     "METHODS",

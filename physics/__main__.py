@@ -15,7 +15,14 @@ from .errors import BlackHoleError
 from .exr import read_exr, write_exr
 from .png import write_png
 from .reference_render import render
-from .shot import MOTIONS, SUPERSAMPLING, WarpMapParameters, looking_at_hole, unstable_orbit_warning
+from .shot import (
+    DEFAULT_INTERPOLATION,
+    MOTIONS,
+    SUPERSAMPLING,
+    WarpMapParameters,
+    looking_at_hole,
+    unstable_orbit_warning,
+)
 from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
 from .warp_map import bake
 from .warp_map_file import read_warp_map, write_warp_map
@@ -63,7 +70,13 @@ def _parser() -> argparse.ArgumentParser:
     baking.add_argument("--fov", type=float, default=60.0, help="vertical field of view, degrees")
     baking.add_argument("--panorama", action="store_true", help="the whole sky, equirectangular, instead of --fov")
     baking.add_argument("--supersampling", type=int, choices=SUPERSAMPLING, default=1, help="map pixels per side")
-    baking.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="error of one step, radians")
+    baking.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="error of a ray, radians")
+    baking.add_argument(
+        "--interpolation",
+        type=float,
+        default=DEFAULT_INTERPOLATION,
+        help="error of direction between traced rays, radians; 0 traces every pixel",
+    )
     baking.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
 
     rendering = commands.add_parser(
@@ -112,6 +125,7 @@ def _bake(options: argparse.Namespace) -> None:
         supersampling=options.supersampling,
         tolerance=options.tolerance,
         method=options.method,
+        interpolation=options.interpolation,
     )
     parameters.validate()
     warning = unstable_orbit_warning(parameters)
