@@ -10,9 +10,7 @@ import math
 from pathlib import Path
 
 import scene_tools as tools
-from scene_tools import MeshParts, bpy
-
-from mathutils import Vector
+from scene_tools import MeshParts, Vector, bpy
 
 FRAMES = 72
 HDRI = "sunset.exr"
@@ -66,7 +64,7 @@ def marble() -> bpy.types.Material:
     colour = tools.colour_ramp(
         stone,
         veins.outputs["Distance"],
-        [(0.0, (0.75, 0.66, 0.52)), (0.012, (0.30, 0.27, 0.24)), (0.05, (0.035, 0.035, 0.04)), (0.3, (0.012, 0.012, 0.014))],
+        [(0.0, (0.75, 0.66, 0.52)), (0.012, (0.30, 0.27, 0.24)), (0.05, (0.035, 0.035, 0.04)), (0.3, (0.012,) * 3)],
     )
     tools.feed(stone, "Base Color", colour)
     return stone
@@ -102,7 +100,7 @@ def materials() -> dict[str, bpy.types.Material]:
         "glass": tools.material("Glass", (1.0, 1.0, 1.0), **clear),
         "ruby": tools.material("Ruby Glass", (1.0, 0.12, 0.10), **clear),
         "sea": tools.material("Sea Glass", (0.35, 0.85, 0.80), **clear),
-        "lacquer": tools.material("Lacquer", (0.008, 0.008, 0.01), roughness=0.25, coat_weight=1.0, coat_roughness=0.02),
+        "lacquer": tools.material("Lacquer", (0.008,) * 3, roughness=0.25, coat_weight=1.0, coat_roughness=0.02),
         "pearl": tools.material("Pearl", (0.86, 0.80, 0.74), roughness=0.22, coat_weight=0.7, sheen_weight=0.3),
     }
 
@@ -145,8 +143,8 @@ def build_stand(name: str, place: tuple[float, float], height: float, shades: di
     foot = [(0.0, 0.0), (0.15, 0.0), (0.155, 0.012), (0.145, 0.028), (0.07, 0.05), (0.035, 0.09)]
     knop = [(0.022, 0.13), (0.02, 0.22), *tools.arc((0.018, 0.26), 0.028, -70.0, 70.0, 8), (0.018, 0.30)]
     stem = [(0.014, 0.42), (0.014, height - 0.14), (0.026, height - 0.12), (0.016, height - 0.09)]
-    cup = [(0.04, height - 0.05), (0.085, height), (0.092, height + 0.01), (0.08, height + 0.006), (0.0, height - 0.035)]
-    parts.lathe([*foot, *knop, *stem, *cup], 64)
+    cup = [(0.04, -0.05), (0.085, 0.0), (0.092, 0.01), (0.08, 0.006), (0.0, -0.035)]
+    parts.lathe([*foot, *knop, *stem, *((x, height + z) for x, z in cup)], 64)
     parts.build(name, [shades["brass"]], location=(*place, TOP), smooth=math.radians(50.0))
 
 
@@ -211,10 +209,9 @@ def build() -> None:
     scene.umbra.environment_source = "WORLD"
     bpy.ops.umbra.setup_compositor()
 
-    camera = tools.moving_camera(
+    tools.moving_camera(
         scene, lens=22.0, path=camera_path(-13.0, 13.0, 7), aim=[(1, (0.0, 0.0, -0.36)), (FRAMES, (0.0, 0.0, -0.3))]
     )
-    camera.name = "Camera"
     shades = materials()
     build_plinth(shades)
     build_spheres(shades)

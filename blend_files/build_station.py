@@ -11,11 +11,9 @@ import random
 import tempfile
 from pathlib import Path
 
-import scene_tools as tools
-from scene_tools import MeshParts, bpy
-
 import numpy as np
-from mathutils import Euler, Matrix, Vector
+import scene_tools as tools
+from scene_tools import Euler, Matrix, MeshParts, Vector, bpy
 
 FRAMES = 72
 SKY_HEIGHT = 2048
@@ -47,6 +45,7 @@ def star_panorama() -> bpy.types.Image:
         print(f"star sky: {path.stat().st_size / 1e6:.1f} MB")
         image = tools.pack_image(path, "Star Sky")
     bpy.data.images.remove(buffer)
+    settings.exr_codec, settings.quality = "ZIP", 90
     settings.file_format, settings.color_depth = "PNG", "8"
     return image
 
@@ -123,9 +122,7 @@ def materials() -> dict[str, bpy.types.Material]:
         ),
         "glass": tools.material("Dark Window", (0.01, 0.012, 0.016), roughness=0.08),
         "red": tools.material("Red Light", (0.1, 0.0, 0.0), emission_color=(1.0, 0.06, 0.03), emission_strength=14.0),
-        "engine": tools.material(
-            "Engine", (0.02, 0.03, 0.05), emission_color=(0.28, 0.6, 1.0), emission_strength=18.0
-        ),
+        "engine": tools.material("Engine", (0.02, 0.03, 0.05), emission_color=(0.28, 0.6, 1.0), emission_strength=4.0),
     }
 
 
@@ -196,12 +193,9 @@ def build_core(parent: bpy.types.Object, shades: dict[str, bpy.types.Material]) 
     """The part at rest: hub, docking port, mast with solar wings, dish."""
     parts = MeshParts()
     hull, dark, foil, lit = range(4)
-    parts.lathe(
-        [(0.0, -0.62), (0.2, -0.62), (0.24, -0.58), (0.24, -0.42), (0.3, -0.36), (0.36, -0.28), (0.36, 0.28)]
-        + [(0.3, 0.36), (0.22, 0.44), (0.22, 0.66), (0.17, 0.7), (0.0, 0.7)],
-        64,
-        hull,
-    )
+    body = [(0.0, -0.62), (0.2, -0.62), (0.24, -0.58), (0.24, -0.42), (0.3, -0.36), (0.36, -0.28), (0.36, 0.28)]
+    body += [(0.3, 0.36), (0.22, 0.44), (0.22, 0.66), (0.17, 0.7), (0.0, 0.7)]
+    parts.lathe(body, 64, hull)
     for height, radius in ((-0.2, 0.375), (0.2, 0.375), (-0.5, 0.252), (0.56, 0.232)):
         ring = [(radius - 0.04, height - 0.03), (radius, height - 0.03), (radius, height + 0.03)]
         parts.lathe([*ring, (radius - 0.04, height + 0.03)], 64, dark, closed=True)

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import sys
-import tempfile
 import time
 from pathlib import Path
+
+from scene_tools import addon, bpy
 
 FOLDER = Path(__file__).resolve().parent
 SCENES = ("station", "plinth")
@@ -60,8 +60,6 @@ def parse() -> argparse.Namespace:
 
 def render_scene(name: str, arguments: argparse.Namespace) -> None:
     """Render frames of one scene; raises RuntimeError with a sentence when that fails."""
-    import bpy
-
     source = FOLDER / f"{name}.blend"
     if not source.is_file():
         raise RuntimeError(f"{source} is missing: build it with blend_files/build_{name}.py in Blender 4.5.")
@@ -78,6 +76,7 @@ def render_scene(name: str, arguments: argparse.Namespace) -> None:
     frames = range(scene.frame_start, scene.frame_end + 1) if arguments.animation else arguments.frames
     for frame in frames:
         picture = arguments.out / f"{name}_{frame:04d}.png"
+        picture.unlink(missing_ok=True)  # an old picture must not pass for this one
         start = time.perf_counter()
         scene.frame_set(frame)
         render.filepath = str(picture)
@@ -86,7 +85,7 @@ def render_scene(name: str, arguments: argparse.Namespace) -> None:
         print(f"{picture}  ({time.perf_counter() - start:.0f} s)", flush=True)
 
 
-def choose_denoiser(scene: bpy.types.Scene) -> None:  # noqa: F821  bpy is imported late, see main()
+def choose_denoiser(scene: bpy.types.Scene) -> None:
     """Denoise where this Blender can; else take more samples."""
     import _cycles
 
@@ -95,25 +94,25 @@ def choose_denoiser(scene: bpy.types.Scene) -> None:  # noqa: F821  bpy is impor
         scene.cycles.samples *= 4
 
 
+def make_folder(folder: Path) -> None:
+    """Make the output folder; raises RuntimeError with a sentence when that fails."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RuntimeError(f"the folder {folder} cannot be made ({error.strerror}); choose another one.") from error
+
+
 def main() -> None:
     """Run from the command line."""
     arguments = parse()
     arguments.out = arguments.out.resolve()
-    # Blender reads this when bpy is first imported: the user's own Blender stays as it is.
-    resources = tempfile.mkdtemp(prefix="umbra-demo-")
-    os.environ["BLENDER_USER_RESOURCES"] = resources
     try:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        sys.path.insert(0, str(FOLDER))
-        import scene_tools
-
-        with scene_tools.addon():
+        make_folder(arguments.out)
+        with addon():
             for name in arguments.scenes:
                 render_scene(name, arguments)
     except (RuntimeError, OSError, ImportError) as error:
         sys.exit(f"The demo could not be rendered: {error}")
-    finally:
-        shutil.rmtree(resources, ignore_errors=True)
 
 
 if __name__ == "__main__":

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -12,15 +14,19 @@ from contextlib import contextmanager
 from pathlib import Path
 
 # Blender reads this when bpy is first imported: what is registered here never touches the user's own Blender.
-os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="umbra-demo-"))
+os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="umbra-demo-")
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Euler, Matrix, Vector
+
+atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
 
 FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parent
 FIRST_VERSION_WITH_OTHER_FILES = (5, 0)
+
+__all__ = ["Euler", "Matrix", "MeshParts", "Vector", "bpy"]  # for scripts, which must not import these before bpy
 
 Point = tuple[float, float, float]
 Colour = tuple[float, float, float]
@@ -80,6 +86,8 @@ def pack_image(path: Path, name: str) -> bpy.types.Image:
     image = bpy.data.images.load(str(path))
     image.name = name
     image.pack()
+    for packed in image.packed_files:  # they remember where they came from on their own
+        packed.filepath = f"//{path.name}"
     image.filepath_raw = f"//{path.name}"
     return image
 
@@ -134,8 +142,11 @@ def spin_steadily(thing: bpy.types.Object, axis: int, turn: float, frames: int) 
 
 
 def save(scene: bpy.types.Scene, name: str) -> None:
-    """Check the scene and save it compressed in this folder."""
+    """Save the scene compressed in this folder, with nothing in it that names a place on this computer."""
     scene.frame_set(scene.frame_start)
+    for space in (space for screen in bpy.data.screens for area in screen.areas for space in area.spaces):
+        if space.type == "FILE_BROWSER" and space.params is not None:
+            space.params.directory = b"//"
     bpy.data.orphans_purge(do_recursive=True)
     path = FOLDER / f"{name}.blend"
     bpy.context.preferences.filepaths.save_version = 0
@@ -298,9 +309,7 @@ def sun(name: str, direction_from: Point, strength: float, colour: Colour, size:
     return light
 
 
-def area_light(
-    name: str, location: Point, aim: Point, size: float, power: float, colour: Colour
-) -> bpy.types.Object:
+def area_light(name: str, location: Point, aim: Point, size: float, power: float, colour: Colour) -> bpy.types.Object:
     """A square soft light that is itself invisible."""
     data = bpy.data.lights.new(name, "AREA")
     data.energy, data.color, data.size = power, colour, size
