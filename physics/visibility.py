@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from .rays import Array
 
 # Cells along each side of a pixel at the edge. A chord across a cell cuts off 1/(8 n^2 R) of the pixel for an edge of
-# radius R pixels: 2e-4 for a shadow 20 pixels wide.
-CELLS = 8
+# radius R pixels: 8e-4 for a shadow 20 pixels wide.
+CELLS = 4
 
 # A shadow of less than a pixel gets cells of about this share of its radius, down to the smallest shadow that can
 # be told from none in a picture of 8 bits.
