@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Umbra Black Hole: a physically exact rotating black hole in a Blender scene."""
 
+import atexit
 from collections.abc import Callable
 
 import bpy
@@ -28,9 +29,12 @@ def register() -> None:
     except BaseException:
         unregister()
         raise
+    # Blender 4.5 as a Python module hangs when the process ends with classes or handlers still registered.
+    atexit.register(unregister)
 
 
 def unregister() -> None:
     """Take everything out of Blender again."""
+    atexit.unregister(unregister)
     while _undo:
         _undo.pop()()

@@ -202,5 +202,8 @@ def load_star_sky() -> bpy.types.Image:
     image = bpy.data.images.load(str(path))
     image.name = STAR_SKY_NAME
     image.pack()
-    image.filepath_raw = f"//{_STAR_SKY_FILE}"  # no path of this computer in a file that may be passed on
+    # no path of this computer in a file that may be passed on
+    image.filepath_raw = f"//{_STAR_SKY_FILE}"
+    for packed in image.packed_files:
+        packed.filepath = image.filepath_raw
     return image

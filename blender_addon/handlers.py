@@ -7,7 +7,6 @@ render_pre takes the map away (the picture is magenta now), and only frame_chang
 render_post, which comes when the picture has been written, only makes sure that this happened.
 """
 
-import atexit
 from collections.abc import Callable
 from pathlib import Path
 
@@ -197,19 +196,12 @@ def register() -> None:
     """Attach the handlers."""
     for name, handler in _HANDLERS.items():
         getattr(bpy.app.handlers, name).append(handler)
-    # handlers that are still attached when Python ends make Blender 4.5 hang
-    atexit.register(_detach)
 
 
 def unregister() -> None:
     """Detach the handlers."""
-    atexit.unregister(_detach)
-    _detach()
-    messages.forget()
-
-
-def _detach() -> None:
     for name, handler in _HANDLERS.items():
         attached = getattr(bpy.app.handlers, name)
         if handler in attached:
             attached.remove(handler)
+    messages.forget()
