@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each test of the add-on starts from Blender's factory scene."""
 
+import bpy  # noqa: F401  before any test module asks for addon_utils, which comes with it
 import pytest
 
 
