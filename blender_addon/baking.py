@@ -16,6 +16,10 @@ from ._physics import physics
 from .compositor_tree import find_setup
 from .errors import SceneError
 
+# The map that was traced last. Frames of an orbit see the same sky turned about the hole's axis: their maps are made
+# from this one, always the same one, so that errors do not add up.
+_traced: "physics.WarpMap | None" = None
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -61,15 +65,27 @@ def bake_map(
 ) -> Generator[float, None, "physics.WarpMap"]:
     """Bake one map into a file; yields the fraction done, and returns the map.
 
+    It is traced, or made from the map that was traced last where only the camera's azimuth differs.
+
     Raises
     ------
     physics.BlackHoleError
         The parameters are impossible, or the file cannot be written.
     """
+    global _traced
     maps.prepare(path, parameters.map_size)
-    warp_map = yield from physics.bake_steps(parameters)
+    warp_map = None if _traced is None else physics.turned_map(_traced, parameters)
+    if warp_map is None:
+        warp_map = yield from physics.bake_steps(parameters)
+        _traced = warp_map
     physics.write_warp_map(path, warp_map)
     return warp_map
+
+
+def forget_traced_map() -> None:
+    """Free the memory of the map that was traced last, when a bake or a render is over."""
+    global _traced
+    _traced = None
 
 
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
@@ -135,6 +151,7 @@ def bake_frames(
 
 def finish(scene_name: str) -> None:
     """Let the compositor see new maps."""
+    forget_traced_map()
     scene = bpy.data.scenes.get(scene_name)
     if scene is not None and find_setup(scene) is not None:
         sync.refresh(scene)

@@ -4,6 +4,7 @@
 from .cameras import PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
+from .sharing import turned_map
 from .shot import (
     DEFAULT_INTERPOLATION,
     MOTIONS,
@@ -41,6 +42,7 @@ __all__ = [
     "read_warp_map",
     "read_warp_map_metadata",
     "trace_rays",
+    "turned_map",
     "unstable_orbit_warning",
     "write_warp_map",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +155,7 @@ class Painting:
         """Fill whole tiles of sky from Chebyshev coefficients."""
         vectors = interpolate(coefficients, tiles.side, self._view.hole_to_world).astype(np.float32)
         theta = np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
-        phi = _wrapped(np.arctan2(vectors[:, 1], vectors[:, 0]))
+        phi = wrapped(np.arctan2(vectors[:, 1], vectors[:, 0]))
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         for i in range(len(tiles)):
@@ -194,7 +195,7 @@ class Painting:
             lost = fate != Fate.SKY
             place = (rows[pixel], columns[pixel])
             self._theta[place] = np.where(lost, 0.0, theta)
-            self._phi[place] = _wrapped(np.where(lost, 0.0, phi).astype(np.float32))
+            self._phi[place] = wrapped(np.where(lost, 0.0, phi))
             self._one_plus_z[place] = np.where(lost, UNRESOLVED_ONE_PLUS_Z, rays.one_plus_z)
             self._unresolved += int(np.count_nonzero(lost))
             self._rays += len(pixel)
@@ -238,8 +239,8 @@ def _pool(mask: Mask, cells: int) -> Mask:
     return pooled
 
 
-def _wrapped(phi: Image) -> Image:
-    """Return angles from -pi to 2 pi brought to [0, 2 pi), which single precision rounds up to 2 pi itself."""
+def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
+    """Return angles from -pi to 2 pi brought to [0, 2 pi) in single precision, which rounds some up to 2 pi itself."""
     turn = np.float32(2.0 * math.pi)
-    phi = np.where(phi < 0.0, phi + turn, phi)
-    return np.where(phi >= turn, np.float32(0.0), phi)
+    single = np.where(phi < 0.0, phi + 2.0 * math.pi, phi).astype(np.float32)
+    return np.where(single >= turn, np.float32(0.0), single)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames that share their rays: the same sky, turned about the spin axis.
+
+Space around the hole looks the same from every azimuth. When only the camera's azimuth changes from one frame to
+the next, as on a circular orbit with the camera tracking the hole, or when hole and camera are turned together, each
+pixel's ray is the same but for a rotation of where it comes from: one map serves for all such frames.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from .painting import wrapped
+from .rays import Array
+from .shot import WarpMapParameters, spherical_triad
+from .warp_map import WarpMap
+
+
+def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:
+    """Return the map of `parameters` made from an earlier one by a rotation, or None where that is not possible.
+
+    Parameters
+    ----------
+    earlier : WarpMap
+    parameters : WarpMapParameters
+        Checked for validity by whoever made the earlier map: what differs cannot make them invalid.
+
+    Returns
+    -------
+    WarpMap or None
+        None unless everything but the azimuth and the hole's orientation agrees to within half of the
+        interpolation error that the parameters allow, which for `interpolation` 0 means exactly. Directions are as
+        good as the earlier map's, visibility and redshift are its own. To keep errors from adding up over many
+        frames, always turn the same map.
+    """
+    before = WarpMapParameters.from_metadata(earlier.metadata["parameters"])
+    if _without_place(before) != _without_place(parameters):
+        return None
+    old, new = _Place(before), _Place(parameters)
+    if not old.sees_the_same_as(new, 0.5 * parameters.interpolation):
+        return None
+    azimuth = new.phi - old.phi
+    about_axis = np.array([
+        [math.cos(azimuth), -math.sin(azimuth), 0.0],
+        [math.sin(azimuth), math.cos(azimuth), 0.0],
+        [0.0, 0.0, 1.0],
+    ])
+    rotation = np.array(parameters.hole_to_world) @ about_axis @ np.array(before.hole_to_world).T
+    metadata = {**earlier.metadata, "hash": parameters.hash, "parameters": parameters.to_metadata()}
+    return _rotated(earlier, rotation, metadata)
+
+
+def _without_place(parameters: WarpMapParameters) -> WarpMapParameters:
+    """Return the parameters with all that `_Place` compares set to fixed values."""
+    nowhere = ((0.0, 0.0, 0.0),) * 3
+    return dataclasses.replace(
+        parameters,
+        camera_position=(0.0, 0.0, 0.0),
+        velocity=(0.0, 0.0, 0.0),
+        camera_to_hole=nowhere,
+        hole_to_world=nowhere,
+    )
+
+
+class _Place:
+    """Where the camera is, how it looks and how it moves, on the triad at its place."""
+
+    def __init__(self, parameters: WarpMapParameters) -> None:
+        x, y, z = parameters.camera_position
+        self.phi = math.atan2(y, x)
+        theta = math.atan2(math.hypot(x, y), z)
+        triad = spherical_triad(theta, self.phi)
+        turned = triad @ np.array(parameters.camera_to_hole)
+        moving = triad @ np.array(parameters.velocity)
+        self._numbers: Array = np.concatenate([[math.log(parameters.radius), theta], turned.ravel(), moving])
+
+    def sees_the_same_as(self, other: _Place, tolerance: float) -> bool:
+        return bool(np.abs(self._numbers - other._numbers).max() <= tolerance)
+
+
+def _rotated(warp_map: WarpMap, rotation: Array, metadata: dict[str, object]) -> WarpMap:
+    seen = warp_map.visibility > 0.0
+    theta, phi = warp_map.theta.copy(), warp_map.phi.copy()
+    turn = math.atan2(rotation[1, 0], rotation[0, 0])
+    if np.abs(rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-12:
+        phi[seen] = wrapped((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
+    else:
+        sin_theta = np.sin(theta[seen], dtype=np.float64)
+        vectors = np.stack([
+            sin_theta * np.cos(phi[seen], dtype=np.float64),
+            sin_theta * np.sin(phi[seen], dtype=np.float64),
+            np.cos(theta[seen], dtype=np.float64),
+        ])
+        x, y, z = rotation @ vectors
+        theta[seen] = np.arctan2(np.hypot(x, y), z)
+        phi[seen] = wrapped(np.arctan2(y, x))
+    return WarpMap(theta, phi, warp_map.one_plus_z, warp_map.visibility, metadata)
