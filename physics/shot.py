@@ -28,7 +28,7 @@ MOTIONS = ("fido", "static", "circular", "circular_retrograde", "free_fall", "ve
 SUPERSAMPLING = (1, 2, 4)
 
 # Error of direction allowed to interpolation, radians: a texel of a sky 8192 pixels wide has 8e-4.
-DEFAULT_INTERPOLATION = 2e-6
+DEFAULT_INTERPOLATION = 5e-6
 LARGEST_INTERPOLATION = 1e-2
 
 # Rotations that come from single-precision matrices are orthonormal to about this.

@@ -46,7 +46,7 @@ def test_adaptive_sampling_keeps_its_promise(name):
         unit_vectors(adaptive.theta.astype(float), adaptive.phi.astype(float)),
         unit_vectors(every.theta.astype(float), every.phi.astype(float)),
     )[seen]
-    # The tolerance is 2e-6; each map rounds phi to 2.4e-7 rad, and the tracing itself errs by up to 1e-6.
+    # The tolerance is 5e-6, which the estimate keeps with room to spare; each map rounds phi to 2.4e-7 rad.
     assert np.quantile(error, 0.999) < 5e-6
     assert error.max() < 1e-4
     assert adaptive.counts["unresolved"] == 0
