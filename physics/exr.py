@@ -80,7 +80,19 @@ def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str
         When the file cannot be written.
     """
     names = "RGBA"[: pixels.shape[2]]
-    channels = {name: np.ascontiguousarray(pixels[:, :, i]) for i, name in enumerate(names)}
+    write_channels(path, {name: np.ascontiguousarray(pixels[:, :, i]) for i, name in enumerate(names)}, attributes)
+
+
+def write_channels(
+    path: PathLike, channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, str] | None = None
+) -> None:
+    """Write channels, arrays of float16 or float32 of one shape (height, width), as `write_exr` does.
+
+    Raises
+    ------
+    ImageFileError
+        When the file cannot be written.
+    """
     header = {
         **(attributes or {}),
         "compression": OpenEXR.ZIP_COMPRESSION,
@@ -89,7 +101,7 @@ def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str
     expected = None
     with replacing(path) as temporary:
         try:
-            with OpenEXR.File(header, channels) as file:
+            with OpenEXR.File(header, dict(channels)) as file:
                 file.write(str(temporary))
             expected = temporary.stat().st_size
         except RuntimeError as error:
@@ -108,15 +120,25 @@ def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
     ImageFileError
         When the file is missing, damaged or holds no picture.
     """
-    with _opened(path, header_only=False) as file:
-        channels = {name: channel.pixels for name, channel in file.channels().items()}
-        header = _attributes(file)
+    channels, header = read_channels(path)
     if "Y" in channels and "R" not in channels:
         channels = dict.fromkeys("RGB", channels["Y"]) | {k: v for k, v in channels.items() if k == "A"}
     names = [name for name in "RGBA" if name in channels]
     if names[:3] != ["R", "G", "B"]:
         raise ImageFileError(f"{path} has no channels R, G and B; it is not a picture that can be used here.")
     return np.stack([np.asarray(channels[name], dtype=np.float32) for name in names], axis=-1), header
+
+
+def read_channels(path: PathLike) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read an EXR file's channels as they are, shape (height, width) each, row 0 at the top, and its header.
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing or damaged.
+    """
+    with _opened(path, header_only=False) as file:
+        return {name: channel.pixels for name, channel in file.channels().items()}, _attributes(file)
 
 
 def read_exr_header(path: PathLike) -> dict[str, Any]:

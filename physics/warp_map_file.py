@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ImageFileError, WarpMapError
-from .exr import PathLike, read_exr, read_exr_header, write_exr
+from .exr import PathLike, read_channels, read_exr_header, write_channels
 from .warp_map import WarpMap
 
 FORMAT = "umbra warp map"
 FORMAT_VERSION = 1
+
+CHANNELS = ("R", "G", "B", "A")
+"""theta, phi, 1 + z and visibility."""
 
 # Header attributes, all strings.
 ATTRIBUTE_FORMAT = "umbraFormat"
@@ -36,16 +39,16 @@ def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
     ImageFileError
         When the file cannot be written.
     """
-    pixels = np.stack([warp_map.theta, warp_map.phi, warp_map.one_plus_z, warp_map.visibility], axis=-1)
-    write_exr(
+    planes = (warp_map.theta, warp_map.phi, warp_map.one_plus_z, warp_map.visibility)
+    write_channels(
         path,
-        pixels,
+        dict(zip(CHANNELS, planes, strict=True)),
         {
             ATTRIBUTE_FORMAT: f"{FORMAT} {FORMAT_VERSION}",
             ATTRIBUTE_HASH: warp_map.metadata["hash"],
             ATTRIBUTE_COUNTS: json.dumps(warp_map.metadata["counts"]),
             ATTRIBUTE_PARAMETERS: json.dumps(warp_map.metadata["parameters"]),
-            ATTRIBUTE_CHECKSUM: _checksum(pixels),
+            ATTRIBUTE_CHECKSUM: _checksum(planes),
             "comments": "R, G: theta, phi of the light's origin in world axes (radians); B: 1 + z; A: sky visibility",
         },
     )
@@ -60,13 +63,14 @@ def read_warp_map(path: PathLike) -> WarpMap:
         When the file is missing, damaged, cut short, or not a warp map; the message names it and says which.
     """
     try:
-        pixels, header = read_exr(path)
+        channels, header = read_channels(path)
     except ImageFileError as error:
         raise WarpMapError(_advice(str(error))) from error
     metadata = _metadata(path, header)
-    if pixels.shape[2] != 4 or _checksum(pixels) != header.get(ATTRIBUTE_CHECKSUM):
+    planes = [channels[name] for name in CHANNELS if name in channels]
+    if len(planes) != len(CHANNELS) or _checksum(planes) != header.get(ATTRIBUTE_CHECKSUM):
         raise WarpMapError(_advice(f"{path} is damaged: its pixels are not those that were written."))
-    theta, phi, one_plus_z, visibility = (np.ascontiguousarray(pixels[:, :, i]) for i in range(4))
+    theta, phi, one_plus_z, visibility = planes
     _check_ranges(path, theta, phi, one_plus_z, visibility)
     return WarpMap(theta, phi, one_plus_z, visibility, metadata)
 
@@ -119,9 +123,12 @@ def _check_ranges(path: PathLike, *planes: NDArray[np.float32]) -> None:
         raise WarpMapError(_advice(f"{Path(path)} is damaged: it holds values that no warp map has."))
 
 
-def _checksum(pixels: NDArray[np.float32]) -> str:
-    data = np.ascontiguousarray(pixels, dtype="<f4")
-    return f"crc32 {zlib.crc32(data.tobytes()):08x}"
+def _checksum(planes: Sequence[NDArray[Any]]) -> str:
+    """Return the CRC-32 of the channels' bytes, one after another."""
+    value = 0
+    for plane in planes:
+        value = zlib.crc32(np.ascontiguousarray(plane, dtype="<f4").data, value)
+    return f"crc32 {value:08x}"
 
 
 def _advice(sentence: str) -> str:
