@@ -24,6 +24,8 @@ _waiting: set[str] = set()
 _devices: dict[str, str] = {}
 # Scenes that an error was already shown for in this render.
 _told: set[str] = set()
+# Scenes whose unstable orbit was mentioned in this render.
+_noted: set[str] = set()
 # Set while this module itself steps the scene to other frames.
 _busy = False
 
@@ -63,6 +65,7 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
 def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     _told.discard(scene.name)
+    _noted.discard(scene.name)
     if not is_in_use(scene):
         return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
@@ -135,17 +138,41 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
         _busy = False
     parameters = frame_shot.parameters
     path = baking.path_of(scene, frame_shot)
-    if not maps.is_fresh(path, parameters):
+    _note_unstable_orbit(scene, parameters)
+    fault = maps.fault_of(path, parameters)
+    if fault is not None:
         if not scene.umbra.auto_bake:
-            raise SceneError(
-                "The warp map is missing or out of date: bake it, or switch on Bake When Rendering in the Umbra panel."
-            )
+            raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
         where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
         print(f"Umbra: baking the warp map of frame {frame_shot.frame}{where}", flush=True)
         for _fraction in baking.bake_map(path, parameters):
             pass
+    _check_resolved(path, frame_shot)
     sync.point_at_maps(scene)
     _waiting.discard(scene.name)
+
+
+def _check_resolved(path: Path, frame_shot: shot.Shot) -> None:
+    """Refuse, where nobody sees the magenta, a map with pixels that its method could not resolve."""
+    unresolved = physics.read_warp_map_metadata(path)["counts"]["unresolved"]
+    if not unresolved:
+        return
+    text = (
+        f"Frame {frame_shot.frame}: {unresolved} pixels could not be resolved by the method "
+        f'"{physics.METHODS[frame_shot.parameters.method].label}" and are magenta; choose the method "Fast" in the '
+        "Umbra panel, which resolves them."
+    )
+    if without_window():
+        raise SceneError(text)
+    messages.warn(text)
+
+
+def _note_unstable_orbit(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
+    """Say once a render that the orbit is unstable: the picture is right, and the artist may want to know."""
+    note = physics.unstable_orbit_warning(parameters)
+    if note is not None and scene.name not in _noted:
+        _noted.add(scene.name)
+        print(f"Umbra: {note}", flush=True)
 
 
 # --- files ----------------------------------------------------------------------------------------

@@ -88,20 +88,25 @@ def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, in
 
 
 def is_fresh(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> bool:
-    """Whether a map exists and was made by exactly these parameters; a damaged or foreign one is not.
+    """Whether a map exists and was made by exactly these parameters; a damaged or foreign one is not."""
+    return fault_of(path, parameters, thorough=thorough) is None
+
+
+def fault_of(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> str | None:
+    """What is wrong with a map as the beginning of a sentence, or None if it holds.
 
     Thorough: its pixels are read and checked too (some 0.1 s in full HD); otherwise the header is taken at its word.
     """
     if not path.is_file():
-        return False
+        return f"The warp map {path} is missing"
     try:
         if physics.read_warp_map_metadata(path)["hash"] != parameters.hash:
-            return False
+            return f"The warp map {path} is out of date"
         if thorough:
             physics.read_warp_map(path)
-    except physics.WarpMapError:
-        return False
-    return True
+    except physics.WarpMapError as error:
+        return str(error).removesuffix("; bake it again.")
+    return None
 
 
 def count_baked(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frames: range) -> int:

@@ -101,6 +101,8 @@ def _parser() -> argparse.ArgumentParser:
 def _bake(options: argparse.Namespace) -> None:
     if options.output.suffix.lower() != ".exr":
         raise BlackHoleError(f"{options.output} does not end in .exr; warp maps are OpenEXR files.")
+    if options.output.is_dir():
+        raise BlackHoleError(f"{options.output} is a folder; give the name of a file.")
     if not 0.0 <= options.inclination <= 180.0:
         raise BlackHoleError(f"The inclination is {options.inclination:g} degrees; give 0 to 180.")
     camera: Camera
@@ -134,8 +136,10 @@ def _bake(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     warp_map = bake(parameters, progress=_ProgressPrinter())
     write_warp_map(options.output, warp_map)
-    pixels = ", ".join(f"{count} {name}" for name, count in warp_map.counts.items())
-    print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels")
+    counts = dict(warp_map.counts)
+    rays = counts.pop("rays")
+    pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
+    print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels from {rays} rays")
     unresolved = warp_map.counts["unresolved"]
     if unresolved:
         print(f"note: {unresolved} pixels could not be resolved and will show magenta", file=sys.stderr)

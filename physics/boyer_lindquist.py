@@ -10,6 +10,7 @@ its exponential parting of neighbours would amplify the integration's own error 
 from __future__ import annotations
 
 import copy
+import math
 from typing import Self
 
 import numpy as np
@@ -65,8 +66,10 @@ class PrintedSystem:
         self._horizon = horizon_radius(a)
         self._drift_limit = DRIFT_LIMIT * tolerance
         passes = (rays.radial > 0.0) | (barrier.radius > observer.r)
-        margin = np.abs(barrier.height) / (barrier.curvature * barrier.radius**2)  # NaN without a barrier
-        self._critical = passes & (margin < EDGE_LIMIT * tolerance)
+        near = np.abs(barrier.height) < EDGE_LIMIT * tolerance * barrier.curvature * barrier.radius**2
+        # A camera on the axis has no ray that these coordinates could even begin with.
+        on_axis = not math.sin(observer.theta) > POLE_LIMIT
+        self._critical = (passes & near) | on_axis
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d zeta along the backward ray to `out`; both (5, n).
@@ -117,7 +120,8 @@ class PrintedSystem:
 
     def first_step(self) -> Array:
         """Return a first step in zeta, shape (n,)."""
-        return np.full(self.state.shape[1], FIRST_STEP * self.state[R, 0])
+        step: Array = FIRST_STEP * self.state[R]
+        return step
 
     def limit(self, state: Array, slope: Array, step: Array) -> Array:
         """Return `step` as it is: the far radius need not be met exactly."""

@@ -83,7 +83,13 @@ class PerspectiveCamera:
 
     @classmethod
     def from_field_of_view(cls, width: int, height: int, vertical: float) -> PerspectiveCamera:
-        """Return the camera with square pixels whose picture is `vertical` radians high, 0 < vertical < pi."""
+        """Return the camera with square pixels whose picture is `vertical` radians high.
+
+        Raises
+        ------
+        BlackHoleError
+            Unless 0 < vertical < pi, or for a size out of range.
+        """
         if not 0.0 < vertical < math.pi:
             raise BlackHoleError(
                 f"The field of view is {math.degrees(vertical):g} degrees; it must be between 0 and 180 degrees."

@@ -92,14 +92,15 @@ def axis_safe_sin(theta: float) -> float:
 
 
 def horizon_radius(spin: float) -> float:
-    """Return the radius r_+ of the outer event horizon, in units of M (BPT Eq. 2.6)."""
+    """Return the radius r_+ of the outer event horizon, in units of M (BPT Eq. 2.6); `spin` within (-1, 1)."""
     return 1.0 + math.sqrt((1.0 - spin) * (1.0 + spin))
 
 
 def ergosphere_radius(spin: float, theta: float) -> float:
     """Return the radius inside which nothing can be at rest against the stars, in units of M.
 
-    Where g_tt = 0: r = 1 + sqrt(1 - a^2 cos^2 theta) (BPT Eq. 2.7); `theta` in radians.
+    Where g_tt = 0: r = 1 + sqrt(1 - a^2 cos^2 theta) (BPT Eq. 2.7). `spin` within (-1, 1), `theta` in radians,
+    [0, pi].
     """
     a_cos = spin * math.cos(theta)
     return 1.0 + math.sqrt((1.0 - a_cos) * (1.0 + a_cos))
@@ -108,14 +109,17 @@ def ergosphere_radius(spin: float, theta: float) -> float:
 def photon_orbit_radius(spin: float, prograde: bool = True) -> float:
     """Return the radius of the equatorial circular photon orbit, in units of M (Eq. 10; BPT Eq. 2.18).
 
-    `prograde` means turning with the hole, whichever way that is.
+    `spin` within (-1, 1); `prograde` means turning with the hole, whichever way that is.
     """
     a = abs(spin) if prograde else -abs(spin)
     return 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-a)))
 
 
 def isco_radius(spin: float, prograde: bool = True) -> float:
-    """Return the radius of the innermost stable circular orbit, in units of M (BPT Eq. 2.21)."""
+    """Return the radius of the innermost stable circular orbit, in units of M (BPT Eq. 2.21).
+
+    `spin` within (-1, 1); `prograde` means turning with the hole, whichever way that is.
+    """
     a = abs(spin)
     z1 = 1.0 + ((1.0 - a) * (1.0 + a)) ** (1.0 / 3.0) * ((1.0 + a) ** (1.0 / 3.0) + (1.0 - a) ** (1.0 / 3.0))
     z2 = math.sqrt(3.0 * a * a + z1 * z1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The null geodesics in Mino time: the regularised form of Eq. 2 that is traced by default.
+"""The null geodesics in Mino time: the regularised form of Eq. 2.
 
 Multiplying Eq. 2 of Verbraeck & Eisemann by rho^2 (Mino 2003, Phys. Rev. D 67, 084027: d lambda = d zeta /
 rho^2) separates r from theta. With u = 1/r and n the unit vector of the angles (theta, phi_theta):

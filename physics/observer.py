@@ -56,7 +56,13 @@ class Observer:
 
     def __post_init__(self) -> None:
         values = (self.r, self.theta, self.phi, self.beta, *self.direction)
-        if len(values) != 7 or not all(math.isfinite(value) for value in values):
+        if len(self.direction) != 3:
+            raise BlackHoleError(f"The direction of motion has {len(self.direction)} components; give three.")
+        try:
+            finite = all(math.isfinite(value) for value in values)
+        except TypeError:
+            finite = False
+        if not finite:
             raise BlackHoleError(f"The observer's position and motion must be finite numbers, not {values}.")
         if self.r <= 0.0:
             raise BlackHoleError(f"The observer's radius is {self.r:g}; it must be positive.")
@@ -74,7 +80,20 @@ class Observer:
 
     @classmethod
     def fido(cls, r: float, theta: float, phi: float) -> Observer:
-        """Return the fiducial observer (FIDO, ZAMO): no angular momentum, dragged along by the spin."""
+        """Return the fiducial observer (FIDO, ZAMO): no angular momentum, dragged along by the spin.
+
+        Parameters
+        ----------
+        r : float
+            Radius, units of M.
+        theta, phi : float
+            Radians, theta in [0, pi].
+
+        Raises
+        ------
+        BlackHoleError
+            For values out of range. The horizon is checked where the spin is known: when rays are made.
+        """
         return cls(r, theta, phi)
 
     @classmethod
@@ -83,6 +102,15 @@ class Observer:
 
         Its angular velocity is 0, hence beta = varpi omega / alpha against the dragging (Eq. 14 with
         Omega = 0).
+
+        Parameters
+        ----------
+        spin : float
+            Kerr parameter, -1 < a < 1.
+        r : float
+            Radius, units of M, outside the horizon.
+        theta, phi : float
+            Radians, theta in [0, pi].
 
         Raises
         ------
@@ -103,7 +131,16 @@ class Observer:
     def circular_orbit(cls, spin: float, r: float, phi: float = 0.0, prograde: bool = True) -> Observer:
         """Return the observer on the circular geodesic orbit in the equatorial plane (Eq. 14).
 
-        `prograde` means turning with the hole's spin (towards +phi when the spin is 0).
+        Parameters
+        ----------
+        spin : float
+            Kerr parameter, -1 < a < 1.
+        r : float
+            Radius, units of M, outside the photon orbit.
+        phi : float
+            Azimuth, radians; theta is pi / 2.
+        prograde : bool
+            Whether it turns with the hole's spin (towards +phi when the spin is 0) or against it.
 
         Raises
         ------
@@ -139,6 +176,17 @@ class Observer:
         In the equatorial plane this is the circular geodesic orbit; off it there is no such geodesic, and
         the observer is a powered flight that keeps abreast of the orbit below.
 
+        Parameters
+        ----------
+        spin : float
+            Kerr parameter, -1 < a < 1.
+        r : float
+            Radius, units of M, outside the horizon.
+        theta, phi : float
+            Radians, theta in [0, pi].
+        prograde : bool
+            As for `circular_orbit`.
+
         Raises
         ------
         BlackHoleError
@@ -167,6 +215,20 @@ class Observer:
 
         Energy conservation gives the FIDO's measure gamma = 1 / alpha, hence beta = sqrt(1 - alpha^2),
         along -r-hat.
+
+        Parameters
+        ----------
+        spin : float
+            Kerr parameter, -1 < a < 1.
+        r : float
+            Radius, units of M, outside the horizon.
+        theta, phi : float
+            Radians, theta in [0, pi].
+
+        Raises
+        ------
+        BlackHoleError
+            At or inside the horizon.
         """
         check_spin(spin)
         alpha = metric_functions(spin, r, theta).alpha

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .cameras import PanoramaCamera
 from .rays import Array
 from .shot import WarpMapParameters
 from .tiles import TILE_SIDES, Tiles, interpolate, sample, tiles_of
@@ -28,6 +29,9 @@ GROUP_PIXELS = 4 * BLOCK_SIZE
 # Tiles whose pixels are all traced are this large when that is asked for everywhere: small ones would work out the
 # corners that they share more than once.
 TRACED_SIDE = 128
+
+# Points that one chord of the shadow's outline is divided into, at the most.
+MOST_PIECES = 100_000
 
 Image = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -118,12 +122,17 @@ class Painting:
     def _outline_points(self) -> tuple[Array, Array]:
         """Return points along the shadow's edge no farther apart than half of the smallest tile."""
         x, y = self._view.outline()
-        step_x, step_y = np.roll(x, -1) - x, np.roll(y, -1) - y
+        next_x, next_y = np.roll(x, -1), np.roll(y, -1)
+        step_x, step_y = next_x - x, next_y - y
         length = np.hypot(step_x, step_y)
-        # Jumps across the whole picture are the seam of a panorama, not parts of the edge.
-        joined = np.isfinite(length) & (length < 0.5 * max(self._width, self._height))
+        # Parts beside the picture do not matter, and a jump from one side of a panorama to the other is its seam.
+        side = TILE_SIDES[-1]
+        joined = (np.maximum(x, next_x) > -side) & (np.minimum(x, next_x) < self._width + side)
+        joined &= (np.maximum(y, next_y) > -side) & (np.minimum(y, next_y) < self._height + side)
+        if isinstance(self._parameters.camera, PanoramaCamera):
+            joined &= length < 0.5 * self._width
         pieces = np.ones(len(x), dtype=np.intp)
-        pieces[joined] = np.minimum(1 + length[joined] // (0.5 * TILE_SIDES[-1]), 1e5).astype(np.intp)
+        pieces[joined] = np.minimum(1 + length[joined] // (0.5 * side), MOST_PIECES).astype(np.intp)
         owner = np.repeat(np.arange(len(x)), pieces)
         first = np.repeat(np.cumsum(pieces) - pieces, pieces)
         part = (np.arange(len(owner)) - first) / pieces[owner]

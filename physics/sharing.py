@@ -18,6 +18,9 @@ from .rays import Array
 from .shot import WarpMapParameters, spherical_triad
 from .warp_map import WarpMap
 
+# Difference between cameras that counts as none, in pixels.
+PIXEL_SHARE = 0.01
+
 
 def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:
     """Return the map of `parameters` made from an earlier one by a rotation, or None where that is not possible.
@@ -32,7 +35,8 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     -------
     WarpMap or None
         None unless everything but the azimuth and the hole's orientation agrees to within half of the
-        interpolation error that the parameters allow, which for `interpolation` 0 means exactly. Directions are as
+        interpolation error that the parameters allow, which for `interpolation` 0 means exactly, and to a hundredth of
+        a pixel, so that a slow pan of a long lens is not taken for a standstill. Directions are as
         good as the earlier map's, visibility and redshift are its own. To keep errors from adding up over many
         frames, always turn the same map.
     """
@@ -40,7 +44,8 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     if _without_place(before) != _without_place(parameters):
         return None
     old, new = _Place(before), _Place(parameters)
-    if not old.sees_the_same_as(new, 0.5 * parameters.interpolation):
+    allowed = min(0.5 * parameters.interpolation, PIXEL_SHARE * _pixel_angle(parameters))
+    if not old.sees_the_same_as(new, allowed):
         return None
     azimuth = new.phi - old.phi
     about_axis = np.array([
@@ -63,6 +68,14 @@ def _without_place(parameters: WarpMapParameters) -> WarpMapParameters:
         camera_to_hole=nowhere,
         hole_to_world=nowhere,
     )
+
+
+def _pixel_angle(parameters: WarpMapParameters) -> float:
+    """Return the angle between two neighbouring pixels of the map in the middle of the picture, radians."""
+    camera = parameters.camera
+    x = 0.5 * camera.width + np.array([0.0, 1.0 / parameters.supersampling])
+    one, other = camera.directions(x, np.full(2, 0.5 * camera.height))
+    return float(np.linalg.norm(other - one))
 
 
 class _Place:

@@ -116,7 +116,13 @@ class WarpMapParameters:
         return self.camera.width * self.supersampling, self.camera.height * self.supersampling
 
     def observer(self) -> Observer:
-        """Return the observer that the camera is."""
+        """Return the observer that the camera is.
+
+        Raises
+        ------
+        BlackHoleError
+            Where this motion is impossible: static inside the ergosphere, faster than light, inside the horizon.
+        """
         x, y, z = self.camera_position
         r, theta, phi = self.radius, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
         match self.motion:

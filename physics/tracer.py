@@ -25,18 +25,20 @@ Progress = Callable[[float], object]
 Cancel = Callable[[], bool]
 Result = TypeVar("Result")
 
-# Error of direction allowed in one step, radians. It leaves medians of about 1e-7 rad.
+# Error of direction, radians: of the whole ray for quadrature, of one step for the methods that take steps. Either way
+# it leaves medians of about 1e-7 rad.
 DEFAULT_TOLERANCE = 1e-6
 # Below this a step's error estimate is rounding noise, and step control stalls.
 SMALLEST_TOLERANCE = 1e-13
 LARGEST_TOLERANCE = 1e-2
 
-# Rays traced at a time: this bounds the memory (about 1 kB a ray). Smaller blocks waste time on
-# the few rays of each that wind around the hole for longest, larger ones leave the cache.
+# Rays traced at a time: this bounds the memory (up to 1 kB a ray, for steps). Smaller blocks waste time on the few rays
+# of each that need most work, larger ones leave the cache.
 BLOCK_SIZE = 16384
 
-# Attempted steps before a ray is given up as UNRESOLVED. Ordinary rays take 5 to 40; each decade of closeness to
-# the critical curve adds some 10 at the default tolerance, up to 150 or so at float64's limit.
+# Attempted steps before a ray is given up as UNRESOLVED, where a method takes steps. With Cash-Karp ordinary rays take
+# 5 to 40; each decade of closeness to the critical curve adds some 10 at the default tolerance, up to 150 or so at
+# float64's limit.
 DEFAULT_MAX_STEPS = 4000
 
 
@@ -95,6 +97,8 @@ def stepping(tableau: Tableau, systems: Systems) -> Tracer:
         direction = np.full((len(rays), 3), np.nan)
         resolved = np.zeros(len(rays), dtype=bool)
         for indices, system in systems(rays, barrier, tolerance):
+            if not len(indices):
+                continue
             outcome = _last(integrate(system, tableau, tolerance, max_steps))
             resolved[indices] = outcome.reached
             arrived = system.select(outcome.reached).sky_direction(outcome.state[:, outcome.reached])
@@ -191,11 +195,12 @@ def trace_rays(
         Where the camera looks, radians, in its own frame with y along its motion (Eq. 4); any shape, broadcast
         against each other.
     tolerance : float
-        Error of direction allowed in one step, radians, 1e-13 to 1e-2.
+        Error of direction, radians, 1e-13 to 1e-2: aimed at for the whole ray by quadrature, allowed in each step by
+        the methods that take steps.
     method : str
         A name in `METHODS`.
     max_steps : int
-        Attempted steps before a ray is reported as UNRESOLVED.
+        Attempted steps before a ray is reported as UNRESOLVED, by the methods that take steps.
     progress : callable, optional
         Called with the fraction done after each block of rays.
     cancel : callable, optional
@@ -214,7 +219,10 @@ def trace_rays(
     Cancelled
         When `cancel` returned true.
     """
-    theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
+    try:
+        theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
+    except (TypeError, ValueError) as error:
+        raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
     if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
         raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
     fate = np.empty(theta.size, dtype=np.uint8)
@@ -243,7 +251,7 @@ def trace_rays(
 def trace_block(
     rays: Rays, tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Trace one block of rays.
+    """Trace one block of rays, all at once; for settings see `trace_rays`.
 
     Returns
     -------

@@ -115,10 +115,15 @@ def edge_function(rays: Rays) -> Array:
     `comes_from_sky` become the single condition Y - X > 0.
     """
     r, a = rays.observer.r, rays.spin
-    with np.errstate(invalid="ignore"):
+    barrier = find_barrier(rays)
+    total = barrier.reach + rays.radial
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # From afar X and Y are both about r^2 and their difference drowns in rounding; R(r_m) does not.
+        facing = (barrier.reach > 0.0) & (rays.radial > 0.0)
+        margin = np.where(facing, -barrier.height / total, barrier.reach - rays.radial)
         # P of Eq. 3 bounds |X|: divided by it, the function stays bounded however large b and q grow.
         bound = r * r + a * a - a * rays.b
-        return np.where(rays.escapes, (find_barrier(rays).reach - rays.radial) / bound, -1.0)
+        return np.where(rays.escapes, margin / bound, -1.0)
 
 
 def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
@@ -135,6 +140,11 @@ def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
     -------
     b0, q0 : ndarray
         Shape of `radius`; units of M and M^2.
+
+    Raises
+    ------
+    BlackHoleError
+        For a spin of 0 or out of range.
     """
     a = check_spin(spin)
     if a == 0.0:

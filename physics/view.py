@@ -13,9 +13,10 @@ from .shot import WarpMapParameters, spherical_triad
 from .tracer import BLOCK_SIZE
 from .trapped import edge_function
 
-# Points on the shadow's outline, and rounds of bisection for each. Chords between them stray from it by (2 pi / n)^2 / 8
-# of its radius of curvature, 5e-6, and pi / 2^rounds is 1e-7: small shares of a pixel of any common picture. Pictures
-# with finer pixels lose nothing but time: what the outline misses, the corners and samples of the tiles find.
+# Points on the shadow's outline, and rounds of bisection for each. Chords between them stray from it by
+# (2 pi / n)^2 / 8 of its radius of curvature, 5e-6, and pi / 2^rounds is 1e-7: small shares of a pixel of any common
+# picture. Pictures with finer pixels lose nothing but time: what the outline misses, the corners and samples of the
+# tiles find.
 OUTLINE_POINTS = 1024
 OUTLINE_ROUNDS = 25
 

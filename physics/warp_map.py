@@ -34,7 +34,7 @@ class WarpMap:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``."""
+        """Pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``; and ``rays`` traced."""
         counts: dict[str, int] = self.metadata["counts"]
         return counts
 

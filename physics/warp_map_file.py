@@ -34,6 +34,12 @@ ATTRIBUTE_CHECKSUM = "umbraChecksum"
 def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
     """Write a warp map to an EXR file, whole or not at all.
 
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be; a file that is there is replaced.
+    warp_map : WarpMap
+
     Raises
     ------
     ImageFileError
@@ -55,7 +61,12 @@ def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
 
 
 def read_warp_map(path: PathLike) -> WarpMap:
-    """Read a warp map.
+    """Read a warp map and check it: its format, its parameters, its pixels' checksum and ranges.
+
+    Returns
+    -------
+    WarpMap
+        As it was written: float32 images of shape (height, width), row 0 at the top, and the metadata.
 
     Raises
     ------

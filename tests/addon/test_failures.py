@@ -68,7 +68,14 @@ for frame, x in ((1, 9.0), (2, 5.0), (3, 0.1)):
         ("hole.scale = (1.0, 1.0, 2.0)", "different scale"),
         ("hole.hide_render = True", "disabled in renders"),
         ("scene.umbra.map_folder = '/proc/umbra'", "cannot be written to"),
-        ("scene.umbra.auto_bake = False", "missing or out of date"),
+        ("scene.umbra.auto_bake = False", "0001.exr is missing: bake it"),
+        ("bpy.ops.umbra.bake_animation(); scene.umbra.auto_bake = False; hole.umbra.spin = 0.5", "is out of date"),
+        ("bpy.ops.umbra.bake_animation(); scene.umbra.auto_bake = False\n"
+         "for each in folder.rglob('*_0001.exr'): each.write_bytes(each.read_bytes()[:-9])",
+         "0001.exr is damaged or cut short"),
+        ("scene.umbra.method = 'cash-karp-printed'; scene.umbra.quality = 'REFERENCE'\n"
+         "scene.camera.location = (0, 0, 9); scene.camera.rotation_euler = (0.0, 0.0, 0.0)",
+         "could not be resolved by the method \"Boyer-Lindquist\""),
         ("scene.umbra.environment_image = None", "no environment"),
         ("scene.umbra.environment_source = 'WORLD'", "no environment"),
         ("hole.umbra.motion = 'CAMERA_ANIMATION'; hole.umbra.speed_of_light = 1e-5\n"

@@ -28,6 +28,9 @@ SHOTS = {
     "wide lens": shot(400, 225, fov=160.0, radius=6.0),
     "whole sky": shot(camera=PanoramaCamera(512, 256), radius=5.0),
     "far away": shot(320, 180, radius=5000.0, fov=30.0),
+    "very far away": shot(320, 180, radius=2e5, fov=30.0, motion="fido"),
+    "a distant hole through a long lens": shot(320, 180, radius=1e4, fov=0.115, motion="fido"),
+    "next to nothing": shot(320, 180, radius=2e6, fov=22.0, motion="fido"),
     "tilted, supersampled": shot(160, 90, supersampling=2, hole_to_world=((0, 0, 1), (1, 0, 0), (0, 1, 0))),
     "sides not multiples of a tile": shot(333, 77),
 }

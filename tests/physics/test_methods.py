@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from references import angle_between, random_sky, unit_vectors
 
-from physics import Fate, Observer, trace_rays
+from physics import METHODS, Fate, Observer, trace_rays
 from physics.metric import horizon_radius
 from physics.polar import PolarMotion
 from physics.quadrature import NODE_COUNTS, RULES
@@ -57,6 +57,19 @@ def test_the_fast_method_follows_its_tolerance(camera):
         error = angle_between(unit_vectors(fast.theta, fast.phi), unit_vectors(reference.theta, reference.phi))[sky]
         # Rounding leaves 1e-11 for the farthest camera (1e-16 of b = 1e5) and 1e-10 next to the horizon.
         assert np.quantile(error, 0.95) < 3.0 * tolerance + 1e-10
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_view_of_nothing_but_shadow(method):
+    result = trace_rays(0.5, Observer.fido(10.0, 1.0, 0.0), math.pi / 2, math.pi, method=method)
+    assert result.fate == Fate.SHADOW
+
+
+@pytest.mark.parametrize("theta", [0.0, 1e-5, math.pi])
+def test_equation_2_as_printed_does_not_start_on_the_axis(theta):
+    result = trace_rays(0.9, Observer.fido(8.0, theta, 0.0), *random_sky(3000), method="cash-karp-printed")
+    assert result.counts["sky"] == 0
+    assert result.counts["unresolved"] > 2000
 
 
 def test_gauss_legendre_rules_integrate_polynomials_exactly():

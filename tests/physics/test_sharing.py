@@ -9,7 +9,7 @@ import pytest
 from references import angle_between, unit_vectors
 from shots import shot
 
-from physics import bake, turned_map
+from physics import PerspectiveCamera, bake, turned_map
 
 
 def about(axis, angle):
@@ -67,6 +67,16 @@ def test_single_precision_noise_of_the_camera_does_not_keep_frames_apart():
         camera_to_hole=np.float32(parameters.camera_to_hole).tolist(),
     )
     assert turned_map(bake(BASE), noisy) is not None
+
+
+def test_a_slow_pan_of_a_long_lens_is_not_a_standstill():
+    """A tenth of a pixel a frame is far less than the interpolation's tolerance allows, and still to be seen."""
+    camera = PerspectiveCamera.from_field_of_view(160, 90, math.radians(0.02))
+    long_lens = dataclasses.replace(BASE, camera=camera, interpolation=1e-4)
+    earlier = bake(long_lens)
+    pan = 0.1 * math.radians(0.02) / 90
+    panned = dataclasses.replace(long_lens, camera_to_hole=(np.array(BASE.camera_to_hole) @ about(1, pan)).tolist())
+    assert turned_map(earlier, panned) is None
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,19 @@ def test_edge_function_has_the_sign_of_the_fate(spin, observer):
     assert np.array_equal(edge_function(rays) > 0.0, comes_from_sky(rays))
 
 
+@pytest.mark.parametrize("radius", [1e3, 1e4, 1e6, 1e9])
+@pytest.mark.parametrize("spin", [0.0, 0.5, 0.999])
+def test_edge_function_keeps_its_sign_for_distant_holes(spin, radius):
+    """Rays within a few shadow radii of a hole's centre, where R(r_cam) and Y^2 are equal to the last digits."""
+    random = np.random.default_rng(1)
+    angle, turn = 20.0 / radius * np.sqrt(random.uniform(size=5000)), random.uniform(0.0, 2.0 * math.pi, 5000)
+    looking = np.stack([-np.cos(angle), np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn)], axis=-1)
+    rays = rays_from_camera(spin, Observer.fido(radius, 1.3, 0.0), looking)
+    sky = comes_from_sky(rays)
+    assert 0.02 < 1.0 - sky.mean() < 0.2  # the shadow is some 5 / 20 of the cone's radius
+    assert np.array_equal(edge_function(rays) > 0.0, sky)
+
+
 def test_edge_function_is_smooth_across_the_edge():
     """Along a line across the edge its second differences stay small: what anti-aliasing needs."""
     observer = Observer.circular_orbit(0.999, 6.03)

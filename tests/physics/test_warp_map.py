@@ -102,7 +102,14 @@ def test_without_mass_the_sky_is_where_it_was(motion):
     speed = math.sqrt(2.0 / math.hypot(*position)) if motion not in ("fido", "static") else 0.0
     assert distance.max() < 1e-6 + speed
     assert warp_map.one_plus_z == pytest.approx(1.0, abs=1e-6 + 1.5 * speed)
-    assert (warp_map.visibility > 0.999).all()
+    assert (warp_map.visibility == 1.0).all()
+
+
+@pytest.mark.parametrize("fov", [22.0, 60.0])
+def test_a_vanishing_hole_leaves_no_speck(fov):
+    """Looking straight at a hole of no size: no pixel may be darker for it."""
+    warp_map = bake(shot(320, 180, radius=1e8, motion="fido", fov=fov))
+    assert (warp_map.visibility == 1.0).all()
 
 
 def test_velocity_agrees_with_the_presets():
