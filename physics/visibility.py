@@ -109,7 +109,11 @@ def refine(
     y = np.broadcast_to(row[:, None, None] + steps[:, None], (count, cells + 1, cells + 1))
     values = edge(x.ravel(), y.ravel()).reshape(x.shape)
 
-    in_cells = _cell_shares(x, y, values, edge)
+    sky = (values > 0.0).reshape(count, -1)
+    in_cells = np.broadcast_to(sky[:, 0].astype(np.float64)[:, None, None], (count, cells, cells)).copy()
+    mixed = np.flatnonzero(sky.any(axis=1) & ~sky.all(axis=1))
+    if len(mixed):
+        in_cells[mixed] = _cell_shares(x[mixed], y[mixed], values[mixed], edge)
     share = in_cells.mean(axis=(1, 2))
     partial = (share > SMALLEST_SHARE) & (share < 1.0 - SMALLEST_SHARE)
     share = np.where(partial, share, np.round(share))
