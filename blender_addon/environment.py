@@ -182,6 +182,11 @@ def _cache_folder() -> Path:
         return Path(bpy.app.tempdir)
 
 
+# Stops by which the star sky is brightened when it is chosen. Its values are those of a photograph of a dark night,
+# in which the stars would be dim points beside anything lit in the scene.
+STAR_SKY_EXPOSURE = 2.5
+
+
 def load_star_sky() -> bpy.types.Image:
     """The built-in sky of real stars, packed into the file so that the file needs nothing else.
 

@@ -76,18 +76,30 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
 
         settings = scene.umbra
         settings.active_hole = hole
+        stars = False
         if settings.environment_source == "WORLD":
             try:
                 environment.read_world(scene)
             except SceneError:
+                stars = settings.environment_image is None
                 settings.environment_image = settings.environment_image or environment.load_star_sky()
                 settings.environment_source = "IMAGE"
         _report_notes(self, compositing.set_up(scene))
+        if stars:
+            _expose_for_stars(scene)
         if len(shot.holes(scene)) > 1:
             self.report({"WARNING"}, _only_one_is_rendered(scene))
         if scene.camera is None:
             self.report({"WARNING"}, "The scene has no camera yet: add one to render the black hole.")
         return {"FINISHED"}
+
+
+def _expose_for_stars(scene: bpy.types.Scene) -> None:
+    """Brighten the star sky, unless the artist has set an exposure."""
+    setup = find_setup(scene)
+    exposure = None if setup is None else setup.group.inputs.get("Exposure")
+    if exposure is not None and exposure.default_value == 0.0:
+        exposure.default_value = environment.STAR_SKY_EXPOSURE
 
 
 def _only_one_is_rendered(scene: bpy.types.Scene) -> str:
@@ -156,6 +168,7 @@ class UMBRA_OT_use_star_sky(bpy.types.Operator):
         settings = context.scene.umbra
         settings.environment_image = environment.load_star_sky()
         settings.environment_source = "IMAGE"
+        _expose_for_stars(context.scene)
         return {"FINISHED"}
 
 

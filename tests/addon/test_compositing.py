@@ -282,8 +282,15 @@ def test_worlds_that_cannot_be_taken_over_say_why(
         environment.read(scene)
 
 
-def test_the_default_world_brings_the_real_stars(scene: bpy.types.Scene) -> None:
+def test_the_default_world_brings_the_real_stars(
+    scene: bpy.types.Scene, tree_module: ModuleType, addon_module: Callable[[str], ModuleType]
+) -> None:
     add_hole(scene, sky=False)
+    exposure = tree_module.find_setup(scene).group.inputs["Exposure"]
+    assert exposure.default_value == addon_module("environment").STAR_SKY_EXPOSURE
+    exposure.default_value = 1.0  # the artist's own stays
+    assert bpy.ops.umbra.use_star_sky() == {"FINISHED"}
+    assert exposure.default_value == 1.0
     image = scene.umbra.environment_image
     assert scene.umbra.environment_source == "IMAGE"
     assert tuple(image.size) == (4096, 2048)
