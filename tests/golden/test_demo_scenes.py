@@ -23,7 +23,9 @@ SCENES = ("station", "plinth")
 # place in a panorama 4096 wide to about 1e-3 texel: beside a star that is a noticeable share of a pixel's value.
 TOLERANCE_NEARLY_EVERYWHERE = 1e-4
 TOLERANCE_EVERYWHERE = 2e-3
-MACHINE_PATH = re.compile(rb"(?:/home/|/root|/Users/|/tmp/|/work/|/usr/|[A-Z]:\\Users)[ -~]*")
+# Where people keep files on common systems, and where this checkout is.
+HERE = re.escape(str(BLEND_FILES.parent).encode())
+MACHINE_PATH = re.compile(rb"(?:" + HERE + rb"|/home/|/Users/|/usr/|/var/|/opt/|[A-Z]:\\Users)[ -~]*")
 
 
 @dataclass(frozen=True)
