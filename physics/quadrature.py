@@ -16,7 +16,7 @@ x = eps sinh(t) moves them to t = +-i pi / 2, and the number of nodes grows only
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +29,11 @@ from .trapped import Barrier
 
 Index = NDArray[np.intp]
 
-# The rules that are used: rays are sorted into classes by the nodes that they need.
-NODE_COUNTS = (6, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128)
+# The rules that are used: rays are sorted into classes by the nodes that they need. Nine rays of ten need 8 or 10; the
+# others are so few that a call for each class costs more than nodes that are not needed.
+NODE_COUNTS = (6, 8, 10, 16, 32, 64, 128)
+
+MOST_NODES_ONE_BY_ONE = 10
 
 # What multiplies rho^(-2 n) in the error of direction, about: the integrand's size on the ellipse times the ray's
 # angular momentum. Found by tracing, not derived: with 1, the worst of the reference rays is wrong by twice the
@@ -228,8 +231,12 @@ def _apply(
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
     a2, drag_b = spin * spin, spin * b
     time, psi = np.zeros_like(unit), np.zeros_like(unit)
-    for node, weight in zip(*rule, strict=True):
-        x = node * half
+    # Node by node for the rules that most rays need; all nodes at once for the others, whose rays are few.
+    passes: Iterable[tuple[float | Array, float | Array]] = zip(*rule, strict=True)
+    if len(rule[0]) > MOST_NODES_ONE_BY_ONE:
+        passes = [(np.array(rule[0])[:, None], np.array(rule[1])[:, None])]
+    for nodes, weights in passes:
+        x = nodes * half
         x += middle
         if scale is not None:
             grown = np.exp(x)
@@ -237,7 +244,7 @@ def _apply(
             x = grown - shrunk
             x *= 0.5 * scale
             grown += shrunk
-            grown *= 0.5 * weight * scale
+            grown *= 0.5 * weights * scale
         z = argument(x)
         speed = rates[-1] * z
         for coefficient in rates[-2:0:-1]:
@@ -246,8 +253,8 @@ def _apply(
         speed += rates[0]
         np.sqrt(speed, out=speed)
         if spin == 0.0:
-            np.divide(weight if scale is None else grown, speed, out=speed)
-            time += speed
+            np.divide(weights if scale is None else grown, speed, out=speed)
+            time += _total(speed)
             continue
         # psi' = -a (2 u - a b u^2) / (1 - 2 u + a^2 u^2), with one division for both integrands
         np.subtract(1.0, z, out=z)
@@ -260,11 +267,17 @@ def _apply(
         above -= 2.0
         above *= z
         speed *= below
-        np.divide(weight if scale is None else grown, speed, out=speed)
+        np.divide(weights if scale is None else grown, speed, out=speed)
         below *= speed
-        time += below
+        time += _total(below)
         above *= speed
-        psi += above
+        psi += _total(above)
     time *= half
     psi *= spin * half
     return time, psi
+
+
+def _total(values: Array) -> Array:
+    """Return the sum over the nodes, the first axis where there is more than one of them."""
+    total: Array = values if values.ndim == 1 else values.sum(axis=0)
+    return total
