@@ -127,7 +127,9 @@ class PolarMotion:
         target = mino_time * np.sqrt(self.mean)
         target += _harmonics(coefficients, even_start, odd_start)
         angle = target / coefficients[0]
-        error = largest  # of the first guess; a round of Newton's method leaves about largest * error^2
+        # The first guess lacks the harmonics at the end, e / 4 and little more; a round of Newton's method, whose
+        # function has a second derivative of e, leaves e times the square of that.
+        error = 0.3 * largest
         while error > 0.1 * tolerance:
             cos, sin = np.cos(angle), np.sin(angle)
             height = v * cos + vertical * sin
