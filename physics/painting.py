@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .cameras import PanoramaCamera
 from .rays import Array
 from .shot import WarpMapParameters
-from .tiles import TILE_SIDES, Tiles, interpolate, sample, tiles_of
+from .tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, tiles_of
 from .tracer import BLOCK_SIZE, Fate, celestial_coordinates, trace_block
 from .view import View
 from .visibility import CENTRE_REACH, cells_for_shadow, centre_block, near_edge, refine
@@ -87,14 +87,15 @@ class Painting:
             seen = _pool(sky, cells)[waiting.row // side, waiting.column // side]
             good = clear & ~seen  # all shadow, as the map is from the start
             smooth = np.flatnonzero(clear & seen)
-            group = max(1, GROUP_PIXELS // (side * side))
+            group = max(1, BLOCK_SIZE // POINTS**2)
             for start in range(0, len(smooth), group):
                 members = smooth[start : start + group]
                 tiles = waiting.select(members)
                 coefficients, determined = sample(tiles, self._directions, self._parameters.interpolation)
                 good[members] = determined
-                self._interpolate(tiles.select(determined), coefficients[determined])
-                yield done + share * (start + len(members)) / len(smooth)
+                yield done + share * (start + 0.5 * len(members)) / len(smooth)
+                for _ in self._interpolate(tiles.select(determined), coefficients[determined]):
+                    yield done + share * (start + len(members)) / len(smooth)
             done += share
             waiting = waiting.select(~good)
             if side != TILE_SIDES[-1]:
@@ -160,8 +161,15 @@ class Painting:
         self._rays += len(x)
         return direction
 
-    def _interpolate(self, tiles: Tiles, coefficients: Array) -> None:
-        """Fill whole tiles of sky from Chebyshev coefficients."""
+    def _interpolate(self, tiles: Tiles, coefficients: Array) -> Generator[None, None, None]:
+        """Fill whole tiles of sky from Chebyshev coefficients, a group at a time."""
+        group = max(1, GROUP_PIXELS // (tiles.side * tiles.side))
+        for start in range(0, len(tiles), group):
+            part = np.arange(start, min(start + group, len(tiles)))
+            self._interpolate_group(tiles.select(part), coefficients[part])
+            yield
+
+    def _interpolate_group(self, tiles: Tiles, coefficients: Array) -> None:
         vectors = interpolate(coefficients, tiles.side, self._view.hole_to_world).astype(np.float32)
         theta = np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
         phi = wrapped(np.arctan2(vectors[:, 1], vectors[:, 0]))
