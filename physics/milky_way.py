@@ -4,7 +4,8 @@
 The model
 ---------
 Starlight is emitted by a double-exponential disc, dimmed by a double-exponential disc of dust, and summed
-along each line of sight; the Sun is in the plane. Every number is published, none is adjusted to the picture:
+along each line of sight; the Sun is in the plane. The numbers follow these works, rounded; none is adjusted to the
+picture:
 
 * disc of stars: scale height 300 pc, scale length 2600 pc (Juric et al. 2008, ApJ 673, 864); luminosity of
   the column through the disc at the Sun 24.4 solar luminosities per square parsec in V, colour from its
