@@ -106,26 +106,23 @@ class TreeBuilder:
 
     def select(self, condition: Value, otherwise: Value, chosen: Value, label: str = "") -> Socket:
         """Float `chosen` where the condition is 1, `otherwise` where it is 0; exact at both ends."""
-        node = self.node("ShaderNodeMix", label)
-        node.data_type = "FLOAT"
-        node.clamp_factor = True
-        by_name = {socket.identifier: socket for socket in node.inputs}
-        self.feed(by_name["Factor_Float"], condition)
-        self.feed(by_name["A_Float"], otherwise)
-        self.feed(by_name["B_Float"], chosen)
-        return next(socket for socket in node.outputs if socket.identifier == "Result_Float")
+        return self._mix("FLOAT", (condition, otherwise, chosen), label)
 
     def select_vector(self, condition: Value, otherwise: Value, chosen: Value, label: str = "") -> Socket:
         """Vector (or colour without alpha): `chosen` where the condition is 1, in proportion in between."""
+        return self._mix("VECTOR", (condition, otherwise, chosen), label)
+
+    def _mix(self, data_type: str, values: tuple[Value, Value, Value], label: str) -> Socket:
+        """Mix node of this type; its sockets of other types, which it has as well, stay unused."""
         node = self.node("ShaderNodeMix", label)
-        node.data_type = "VECTOR"
+        node.data_type = data_type
         node.factor_mode = "UNIFORM"
         node.clamp_factor = True
+        kind = data_type.capitalize()
         by_name = {socket.identifier: socket for socket in node.inputs}
-        self.feed(by_name["Factor_Float"], condition)
-        self.feed(by_name["A_Vector"], otherwise)
-        self.feed(by_name["B_Vector"], chosen)
-        return next(socket for socket in node.outputs if socket.identifier == "Result_Vector")
+        for name, value in zip(("Factor_Float", f"A_{kind}", f"B_{kind}"), values, strict=True):
+            self.feed(by_name[name], value)
+        return next(socket for socket in node.outputs if socket.identifier == f"Result_{kind}")
 
     def combine(self, x: Value, y: Value, z: Value, label: str = "") -> Socket:
         """Vector of three floats."""

@@ -14,7 +14,8 @@ from .trapped import Barrier
 
 def sky_directions(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
     """Return the unit vectors, shape (n, 3), that rays from the sky come from, and which could be answered, (n,)."""
-    answered = PolarMotion.of(rays).usable(tolerance)
+    motion = PolarMotion.of(rays)
+    answered = motion.usable(tolerance)
     time, psi = np.zeros(len(rays)), np.zeros(len(rays))
     for chosen, integrals in (
         (np.flatnonzero(answered & barrier.blocks), turning_integrals),
@@ -26,6 +27,5 @@ def sky_directions(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Arra
     direction = np.full((len(rays), 3), np.nan)
     left = np.flatnonzero(answered)
     if len(left):
-        motion = PolarMotion.of(rays.select(left))
-        direction[left] = motion.direction(time[left], psi[left], tolerance).T
+        direction[left] = motion.select(left).direction(time[left], psi[left], tolerance).T
     return direction, answered

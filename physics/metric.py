@@ -111,8 +111,12 @@ def photon_orbit_radius(spin: float, prograde: bool = True) -> float:
 
     `spin` within (-1, 1); `prograde` means turning with the hole, whichever way that is.
     """
-    a = abs(spin) if prograde else -abs(spin)
-    return 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-a)))
+    return circular_photon_radius(abs(spin) if prograde else -abs(spin))
+
+
+def circular_photon_radius(spin: float) -> float:
+    """Return r_1 of Eq. 10, of light that circles towards +phi; r_2 is that of the opposite spin; in units of M."""
+    return 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-spin)))
 
 
 def isco_radius(spin: float, prograde: bool = True) -> float:

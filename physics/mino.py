@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .rays import Array, Rays
+from .sphere import spherical_triad
 from .trapped import Barrier
 
 Mask = NDArray[np.bool_]
@@ -67,15 +68,11 @@ class MinoSystem(ABC):
 
     def __init__(self, rays: Rays, tolerance: float, start: Array, unit: Array, rates: Array) -> None:
         """`start`: x at the camera; `unit`: u where x = 0; `rates`: polynomial of (d x / d lambda)^2, low first."""
-        theta, phi = rays.observer.theta, rays.observer.phi
-        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
-        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
+        r_hat, theta_hat, phi_hat = spherical_triad(rays.observer.theta, rays.observer.phi)[:, :, None]
         state = np.zeros((N_COMPONENTS, len(rays)))
         state[X] = start
-        state[N] = np.array([sin_theta * cos_phi, sin_theta * sin_phi, cos_theta])[:, None]
+        state[N] = r_hat
         # Light moves with p_theta along theta-hat and b / sin(theta) along phi-hat; the backward ray against it.
-        theta_hat = np.array([cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta])[:, None]
-        phi_hat = np.array([-sin_phi, cos_phi, 0.0])[:, None]
         state[N_PRIME] = -(theta_hat * rays.polar + phi_hat * rays.azimuthal)
         self.state = state
         self._spin = rays.spin

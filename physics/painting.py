@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from .cameras import PanoramaCamera
 from .rays import Array
 from .shot import WarpMapParameters
+from .sphere import celestial_coordinates
 from .tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, tiles_of
-from .tracer import BLOCK_SIZE, Fate, celestial_coordinates, trace_block
+from .tracer import BLOCK_SIZE, Fate, trace_block
 from .view import View
 from .visibility import CENTRE_REACH, cells_for_shadow, centre_block, near_edge, refine
 

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .rays import Array, Rays
+from .sphere import spherical_triad
 
 # Rays are sorted by e into classes up to these, each with as many terms as its upper end needs, so that what becomes of
 # a ray does not depend on its company. Beyond the last the series is no longer a short one.
@@ -42,15 +43,11 @@ class PolarMotion:
     """The constants of the motion for rays from one camera, backward; arrays of shape (n,)."""
 
     spin: float
-    start: Array
-    """n_0, shape (3,)."""
-    v: float
-    """cos(theta_0)."""
+    triad: Array
+    """n_0, theta-hat and phi-hat at the camera, shape (3, 3)."""
     tangent_theta: Array
     tangent_phi: Array
-    """t_0 on the triad at the camera."""
-    frame: Array
-    """theta-hat and phi-hat at the camera, shape (2, 3)."""
+    """t_0 on the triad."""
     base: Array
     """A."""
     pole_speed: Array
@@ -65,10 +62,8 @@ class PolarMotion:
     @classmethod
     def of(cls, rays: Rays) -> PolarMotion:
         """Return the constants for `rays`."""
-        a, theta, phi = rays.spin, rays.observer.theta, rays.observer.phi
-        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
-        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
-        a2, w0 = a * a, cos_theta * cos_theta
+        triad = spherical_triad(rays.observer.theta, rays.observer.phi)
+        a2, w0 = rays.spin * rays.spin, triad[0, 2] * triad[0, 2]
         reduced = rays.carter - a2
         root = np.sqrt(np.maximum(reduced * reduced + 4.0 * a2 * rays.q, 0.0))
         base = 0.5 * (reduced + root)
@@ -77,16 +72,14 @@ class PolarMotion:
             tangent_theta = -rays.polar / np.sqrt(base + a2 * w0)
             tangent_phi = -rays.azimuthal / pole_speed
             # w_+ as the squared length of (v, v' / s), which has no cancellation
-            top = w0 + (sin_theta * tangent_theta) ** 2
+            top = w0 + (triad[1, 2] * tangent_theta) ** 2
             mean = base + 0.5 * a2 * top
             ellipticity = 0.5 * a2 * top / mean
         return cls(
-            a,
-            np.array([sin_theta * cos_phi, sin_theta * sin_phi, cos_theta]),
-            cos_theta,
+            rays.spin,
+            triad,
             tangent_theta,
             tangent_phi,
-            np.array([[cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta], [-sin_phi, cos_phi, 0.0]]),
             base,
             pole_speed,
             -rays.b,
@@ -119,23 +112,27 @@ class PolarMotion:
 
     def _direction(self, mino_time: Array, rotation: Array, largest: float, tolerance: float) -> Array:
         """Return what `direction` does, for rays with e up to `largest`."""
-        v, a2 = self.v, self.spin * self.spin
-        vertical = self.frame[0, 2] * self.tangent_theta  # z component of t_0
+        a2 = self.spin * self.spin
+        v, vertical = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta  # z components of n_0 and t_0
         swing = 0.5 * a2 / self.mean
+
+        def phase(cos: Array | float, sin: Array | float) -> tuple[Array, Array]:
+            """Return e cos(2 chi) and e sin(2 chi) at a path angle, chi being counted from the equator."""
+            height = v * cos + vertical * sin
+            rise = vertical * cos - v * sin
+            return swing * (rise * rise - height * height), 2.0 * swing * rise * height
+
         coefficients = _speed_series(self.ellipticity, largest, tolerance)
-        even_start, odd_start = swing * (vertical * vertical - v * v), (2.0 * v) * swing * vertical
+        start = phase(1.0, 0.0)
         target = mino_time * np.sqrt(self.mean)
-        target += _harmonics(coefficients, even_start, odd_start)
+        target += _harmonics(coefficients, *start)
         angle = target / coefficients[0]
         # The first guess lacks the harmonics at the end, e / 4 and little more; a round of Newton's method, whose
         # function has a second derivative of e, leaves e times the square of that.
         error = 0.3 * largest
         while error > 0.1 * tolerance:
-            cos, sin = np.cos(angle), np.sin(angle)
-            height = v * cos + vertical * sin
-            rise = vertical * cos - v * sin
-            even = swing * (rise * rise - height * height)
-            excess = coefficients[0] * angle + _harmonics(coefficients, even, 2.0 * swing * rise * height)
+            even, odd = phase(np.cos(angle), np.sin(angle))
+            excess = coefficients[0] * angle + _harmonics(coefficients, even, odd)
             excess -= target
             excess *= np.sqrt(1.0 - even)
             angle -= excess
@@ -143,16 +140,14 @@ class PolarMotion:
         cos, sin = np.cos(angle), np.sin(angle)
         turn = rotation
         if a2 > 0.0:
-            height = v * cos + vertical * sin
-            rise = vertical * cos - v * sin
             drift = _turn_series(self.pole_speed / np.sqrt(self.mean), self.ellipticity, len(coefficients))
             path = drift[0] * angle
-            path += _harmonics(drift, swing * (rise * rise - height * height), 2.0 * swing * rise * height)
-            path -= _harmonics(drift, even_start, odd_start)
+            path += _harmonics(drift, *phase(cos, sin))
+            path -= _harmonics(drift, *start)
             turn = rotation + path * (a2 * self.b / (self.pole_speed * self.mean))
         along_theta, along_phi = self.tangent_theta * sin, self.tangent_phi * sin
         x, y, z = (
-            self.start[i] * cos + self.frame[0, i] * along_theta + self.frame[1, i] * along_phi for i in range(3)
+            n_0 * cos + theta_hat * along_theta + phi_hat * along_phi for n_0, theta_hat, phi_hat in self.triad.T
         )
         cos, sin = np.cos(turn), np.sin(turn)
         return np.stack([x * cos - y * sin, x * sin + y * cos, z])

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .metric import MetricFunctions, axis_safe_sin, check_spin, metric_functions
 from .observer import Observer
+from .sphere import unit_vectors
 
 Array = NDArray[np.float64]
 
@@ -70,10 +71,7 @@ class Rays:
 
 def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:
     """Return the unit vectors N of Eq. 4, shape (n, 3), for viewing angles in radians, shape (n,) each."""
-    theta = np.asarray(theta_rd, dtype=np.float64)
-    phi = np.asarray(phi_rd, dtype=np.float64)
-    sin_theta = np.sin(theta)
-    return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1)
+    return unit_vectors(theta_rd, phi_rd)
 
 
 def camera_triad(observer: Observer) -> Array:

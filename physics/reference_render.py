@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .colour import DEFAULT_TEMPERATURE, redshift_gain
+from .sphere import unit_vectors
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -98,14 +99,6 @@ def rotation_matrix(euler: ArrayLike) -> FloatArray:
     about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
     matrix: FloatArray = about_z @ about_y @ about_x
     return matrix
-
-
-def directions_from_angles(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
-    """Unit vectors (sin t cos p, sin t sin p, cos t), shape (..., 3), of polar and azimuthal angles."""
-    polar: FloatArray = np.asarray(theta, dtype=np.float64)
-    azimuth: FloatArray = np.asarray(phi, dtype=np.float64)
-    sine = np.sin(polar)
-    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], axis=-1)
 
 
 def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatArray:
@@ -251,7 +244,7 @@ def render(
     invalid = invalid_pixels(warp_map)
     shift = np.where(invalid, 1.0, one_plus_z)
     seen = np.where(invalid, 1.0, visibility)
-    directions = directions_from_angles(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
+    directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
     colours = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
     colours *= redshift_gain(shift, colour_amount, brightness_amount, temperature)
     colours *= (2.0**exposure * strength * seen)[..., np.newaxis]

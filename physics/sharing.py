@@ -15,7 +15,8 @@ import numpy as np
 
 from .painting import wrapped
 from .rays import Array
-from .shot import WarpMapParameters, spherical_triad
+from .shot import WarpMapParameters
+from .sphere import celestial_coordinates, spherical_triad, unit_vectors
 from .warp_map import WarpMap
 
 # Difference between cameras that counts as none, in pixels.
@@ -101,13 +102,6 @@ def _rotated(warp_map: WarpMap, rotation: Array, metadata: dict[str, object]) ->
     if np.abs(rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-12:
         phi[seen] = wrapped((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
     else:
-        sin_theta = np.sin(theta[seen], dtype=np.float64)
-        vectors = np.stack([
-            sin_theta * np.cos(phi[seen], dtype=np.float64),
-            sin_theta * np.sin(phi[seen], dtype=np.float64),
-            np.cos(theta[seen], dtype=np.float64),
-        ])
-        x, y, z = rotation @ vectors
-        theta[seen] = np.arctan2(np.hypot(x, y), z)
-        phi[seen] = wrapped(np.arctan2(y, x))
+        turned_theta, turned_phi = celestial_coordinates(unit_vectors(theta[seen], phi[seen]) @ rotation.T)
+        theta[seen], phi[seen] = turned_theta, wrapped(turned_phi)
     return WarpMap(theta, phi, warp_map.one_plus_z, warp_map.visibility, metadata)

@@ -16,7 +16,7 @@ from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
 from .metric import check_spin, isco_radius, metric_functions
 from .observer import Observer
-from .rays import Array
+from .sphere import spherical_triad
 from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, check_settings
 
 Vector = tuple[float, float, float]
@@ -169,17 +169,6 @@ class WarpMapParameters:
         camera = dict(values["camera"])
         kind = {"perspective": PerspectiveCamera, "panorama": PanoramaCamera}[camera.pop("kind")]
         return cls(**{**values, "camera": kind(**camera)})
-
-
-def spherical_triad(theta: float, phi: float) -> Array:
-    """Return r-hat, theta-hat and phi-hat at a place as rows of Cartesian components, shape (3, 3)."""
-    sin_theta, cos_theta = math.sin(theta), math.cos(theta)
-    sin_phi, cos_phi = math.sin(phi), math.cos(phi)
-    return np.array([
-        [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta],
-        [cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta],
-        [-sin_phi, cos_phi, 0.0],
-    ])
 
 
 def looking_at_hole(position: Vector) -> Matrix:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -19,6 +18,7 @@ from .mino import DirectRays, TurningRays
 from .observer import Observer
 from .rays import Array, Rays, camera_directions, rays_from_camera
 from .runge_kutta import CASH_KARP, Integration, System, Tableau, integrate
+from .sphere import celestial_coordinates
 from .trapped import Barrier, comes_from_sky, find_barrier
 
 Progress = Callable[[float], object]
@@ -267,15 +267,6 @@ def trace_block(
     fate[sky] = np.where(resolved, Fate.SKY, Fate.UNRESOLVED)
     direction[sky] = found
     return fate, direction
-
-
-def celestial_coordinates(direction: Array) -> tuple[Array, Array]:
-    """Return theta in [0, pi] and phi in [0, 2 pi) of vectors of shape (..., 3); NaN where they are NaN."""
-    x, y, z = direction[..., 0], direction[..., 1], direction[..., 2]
-    theta = np.arctan2(np.hypot(x, y), z)
-    phi = np.arctan2(y, x) % (2.0 * math.pi)
-    # The remainder of a tiny negative angle rounds up to 2 pi itself.
-    return theta, np.where(phi >= 2.0 * math.pi, 0.0, phi)
 
 
 def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS) -> None:

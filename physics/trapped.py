@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import BlackHoleError
-from .metric import check_spin, horizon_radius
+from .metric import check_spin, circular_photon_radius, horizon_radius
 from .rays import Array, Rays
 
 # Newton's method at most doubles its digits: this many rounds serve any start.
@@ -160,9 +160,7 @@ def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
 def trapped_radii(spin: float) -> tuple[float, float]:
     """Return r_1 and r_2, the radii of the prograde and retrograde circular photon orbits (Eq. 10)."""
     a = check_spin(spin)
-    prograde = 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-a)))
-    retrograde = 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(a)))
-    return prograde, retrograde
+    return circular_photon_radius(a), circular_photon_radius(-a)
 
 
 def trapped_impact_parameters(spin: float) -> tuple[float, float]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from .observer import Observer
 from .rays import Array, Rays, rays_from_triad, redshift_vector
-from .shot import WarpMapParameters, spherical_triad
+from .shot import WarpMapParameters
+from .sphere import spherical_triad
 from .tracer import BLOCK_SIZE
 from .trapped import edge_function
 

@@ -32,7 +32,7 @@ from compositor_scene import (
     write_exr,
 )
 
-from physics import reference_render
+from physics import reference_render, sphere
 
 COLOURS = 2e-6
 TEXELS = 1e-4
@@ -80,7 +80,7 @@ def test_noise_in_all_directions(group: GroupRenderer, rotation: tuple[float, ..
     if rotation[0] or rotation[1]:
         # A tilted direction is a float32 vector, accurate to 1e-7 rad; close to the environment's pole its longitude
         # is not, and the pole's row of noise differs with the longitude.
-        directions = reference_render.directions_from_angles(warp_map[..., 0], warp_map[..., 1])
+        directions = sphere.unit_vectors(warp_map[..., 0], warp_map[..., 1])
         x, y, _ = np.moveaxis(directions @ reference_render.rotation_matrix(angles).T, -1, 0)
         error = error * np.hypot(x, y)
     assert error.max() <= TEXELS

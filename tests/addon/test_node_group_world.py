@@ -29,7 +29,7 @@ from compositor_scene import (
 )
 from mathutils import Euler, Matrix
 
-from physics import reference_render
+from physics import reference_render, sphere
 
 SIZE = (64, 36)
 STRENGTH = 1.7
@@ -104,7 +104,7 @@ def test_identity_map_shows_the_world_as_cycles_does(
         environment=sky,
         values={"Environment Rotation": rotation, "Environment Strength": STRENGTH},
     )
-    directions = reference_render.directions_from_angles(warp_map[..., 0], warp_map[..., 1])
+    directions = sphere.unit_vectors(warp_map[..., 0], warp_map[..., 1])
     x, y, _ = np.moveaxis(directions @ reference_render.rotation_matrix(rotation).T, -1, 0)
     apart = np.hypot(x, y) > 0.5 * math.pi / sky.shape[0]
     assert apart.mean() > 0.99

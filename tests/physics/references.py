@@ -62,3 +62,11 @@ def bisect(inside, low: float, high: float) -> float:
             low = middle
         else:
             high = middle
+
+
+def about(axis: int, angle: float) -> np.ndarray:
+    """Rotation about one coordinate axis."""
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix = np.eye(3)
+    matrix[[i, i, j, j], [i, j, i, j]] = math.cos(angle), -math.sin(angle), math.sin(angle), math.cos(angle)
+    return matrix

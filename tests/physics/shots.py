@@ -5,6 +5,9 @@ import math
 
 from physics import PerspectiveCamera, WarpMapParameters, looking_at_hole
 
+# A camera beside the hole, at +x, that looks away from it along +x, z up.
+AWAY = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
 
 def shot(width=48, height=27, radius=10.0, inclination=80.0, fov=60.0, spin=0.999, **others):
     theta = math.radians(inclination)

@@ -6,12 +6,10 @@ import dataclasses
 import numpy as np
 import pytest
 from references import angle_between, unit_vectors
-from shots import shot
+from shots import AWAY, shot
 
 from physics import PanoramaCamera, PerspectiveCamera, bake
 from physics.tiles import Tiles, interpolate, sample, tiles_of
-
-AWAY = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # a camera at +x that looks along +x
 
 SHOTS = {
     "orbit": shot(400, 225),

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from physics.colour import redshift_gain
 from physics.reference_render import (
-    directions_from_angles,
     render,
     resize,
     rotation_matrix,
     sample_environment,
 )
+from physics.sphere import unit_vectors
 
 FloatArray = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def test_smooth_sky_is_seen_where_it_is() -> None:
     warp_map.phi[1, :4] = [0.0, np.pi - 1e-9, np.pi + 1e-9, 2.0 * np.pi - 1e-9]
     warp_map.one_plus_z[:] = warp_map.visibility[:] = 1.0
     picture = render(warp_map, analytic_environment(width, height))
-    expected = analytic_sky(directions_from_angles(warp_map.theta, warp_map.phi))
+    expected = analytic_sky(unit_vectors(warp_map.theta, warp_map.phi))
     # Linear interpolation is off by up to step^2 / 8 times the second derivative (below 2) in each direction; next
     # to a pole the extended row is off by half a step times the slope.
     interior = np.abs(np.cos(warp_map.theta)) < math.cos(np.pi / height)
@@ -75,7 +75,7 @@ def test_smooth_sky_is_seen_where_it_is() -> None:
 def test_texel_centres_give_texels_exactly() -> None:
     environment = np.random.default_rng(1).random((6, 10, 4))
     column, row = np.meshgrid(np.arange(10), np.arange(6))
-    directions = directions_from_angles((row + 0.5) / 6.0 * np.pi, (0.5 - (column + 0.5) / 10.0) * 2.0 * np.pi)
+    directions = unit_vectors((row + 0.5) / 6.0 * np.pi, (0.5 - (column + 0.5) / 10.0) * 2.0 * np.pi)
     np.testing.assert_allclose(sample_environment(environment, directions), environment, rtol=0.0, atol=1e-13)
 
 

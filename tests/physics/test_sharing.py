@@ -6,17 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from references import angle_between, unit_vectors
+from references import about, angle_between, unit_vectors
 from shots import shot
 
 from physics import PerspectiveCamera, bake, turned_map
-
-
-def about(axis, angle):
-    i, j = [(1, 2), (2, 0), (0, 1)][axis]
-    matrix = np.eye(3)
-    matrix[[i, i, j, j], [i, j, i, j]] = math.cos(angle), -math.sin(angle), math.sin(angle), math.cos(angle)
-    return matrix
 
 
 def orbiting(parameters, angle, **changes):

@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from shots import shot
+from shots import AWAY, shot
 
 from physics import PanoramaCamera, PerspectiveCamera, bake
 from physics.rays import rays_from_triad
-from physics.shot import spherical_triad
+from physics.sphere import spherical_triad
 from physics.trapped import comes_from_sky
 from physics.visibility import near_edge, refine
 
@@ -116,8 +116,7 @@ def test_near_edge_takes_neighbours_along():
 def test_near_the_seam_of_a_panorama():
     """A hole behind the camera is cut by the picture's left and right sides: both halves are anti-aliased alike."""
     position = (12.0, 0.0, 0.0)
-    away = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # looks along +x, z up
-    parameters = shot(camera=PanoramaCamera(64, 32), camera_position=position, camera_to_hole=away, motion="fido",
+    parameters = shot(camera=PanoramaCamera(64, 32), camera_position=position, camera_to_hole=AWAY, motion="fido",
                       spin=0.0)
     warp_map = bake(parameters)
     assert (warp_map.visibility[:, 0] < 1.0).any()
@@ -127,7 +126,6 @@ def test_near_the_seam_of_a_panorama():
 
 def test_a_hole_behind_a_perspective_camera_leaves_a_whole_sky():
     position = (12.0, 0.0, 0.0)
-    away = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     camera = PerspectiveCamera(32, 18, 50.0)
-    warp_map = bake(shot(camera=camera, camera_position=position, camera_to_hole=away, motion="fido"))
+    warp_map = bake(shot(camera=camera, camera_position=position, camera_to_hole=AWAY, motion="fido"))
     assert (warp_map.visibility == 1.0).all()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from references import angle_between, unit_vectors
+from references import about, angle_between, unit_vectors
 from shots import shot
 
 from physics import (
@@ -23,14 +23,6 @@ from physics import (
     trace_rays,
     unstable_orbit_warning,
 )
-
-
-def turned(axis, angle):
-    """Rotation about one coordinate axis."""
-    i, j = [(1, 2), (2, 0), (0, 1)][axis]
-    matrix = np.eye(3)
-    matrix[[i, i, j, j], [i, j, i, j]] = math.cos(angle), -math.sin(angle), math.sin(angle), math.cos(angle)
-    return matrix
 
 
 def test_pixels_are_the_rays_of_their_centres():
@@ -60,7 +52,7 @@ def test_pixels_are_the_rays_of_their_centres():
 
 def test_directions_are_in_world_axes():
     """Tilting hole and camera together turns every direction by the same rotation and changes nothing else."""
-    tilt = turned(0, 0.7) @ turned(2, -0.4)
+    tilt = about(0, 0.7) @ about(2, -0.4)
     plain = bake(shot())
     tilted = bake(shot(hole_to_world=tilt.tolist()))
     expected = unit_vectors(plain.theta.astype(float), plain.phi.astype(float)) @ tilt.T
@@ -73,7 +65,7 @@ def test_directions_are_in_world_axes():
 
 def test_moving_the_camera_about_the_axis_turns_the_sky():
     position = (8.0, 0.0, 2.0)
-    turn = turned(2, 1.1)
+    turn = about(2, 1.1)
     one = bake(shot(camera_position=position, camera_to_hole=looking_at_hole(position)))
     other = bake(shot(camera_position=(turn @ position).tolist(),
                       camera_to_hole=(turn @ np.array(looking_at_hole(position))).tolist()))
@@ -92,7 +84,7 @@ def test_without_mass_the_sky_is_where_it_was(motion):
     """Mass towards 0 is distance towards infinity: directions tend to the camera's own, 1 + z to 1."""
     camera = PerspectiveCamera(40, 30, 30.0)
     position = (3e9, -4e9, 1e9)
-    to_hole = turned(1, 0.3) @ turned(2, 2.0)
+    to_hole = about(1, 0.3) @ about(2, 2.0)
     warp_map = bake(shot(camera=camera, camera_position=position, camera_to_hole=to_hole.tolist(), motion=motion))
     y, x = np.mgrid[0:30, 0:40] + 0.5
     straight = camera.directions(x, y) @ to_hole.T
@@ -207,8 +199,8 @@ def test_hash_holds_exactly_while_nothing_changes():
         "spin": 0.9,
         "camera": PerspectiveCamera(48, 27, 20.0),
         "camera_position": (9.0, 0.0, 0.0),
-        "camera_to_hole": turned(0, 0.1).tolist(),
-        "hole_to_world": turned(1, 0.1).tolist(),
+        "camera_to_hole": about(0, 0.1).tolist(),
+        "hole_to_world": about(1, 0.1).tolist(),
         "motion": "fido",
         "velocity": (0.1, 0.0, 0.0),
         "supersampling": 2,
