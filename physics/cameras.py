@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .errors import BlackHoleError
 from .rays import Array
+from .sphere import by_component, cos_sin
 
 # Pictures beyond this are a mistake; refusing them beats running out of memory.
 LARGEST_SIDE = 65536
@@ -109,9 +110,10 @@ class PerspectiveCamera:
         per_pixel, fitted, tall = self._scale()
         right = (x - 0.5 * self.width + self.shift_x * fitted) * per_pixel
         up = ((0.5 * self.height - y) * tall + self.shift_y * fitted) * per_pixel
-        vectors: Array = np.stack([right, up, np.full_like(right, -1.0)], axis=-1)
-        vectors /= np.sqrt(right * right + up * up + 1.0)[..., None]
-        return vectors
+        away = 1.0 / np.sqrt(right * right + up * up + 1.0)
+        right *= away
+        up *= away
+        return by_component(right, up, -away)
 
     def component(self, x: ArrayLike, y: ArrayLike, vector: Array) -> Array:
         """Return the component along `vector`, shape (3,), of the unit vectors seen at x, y, which may broadcast."""
@@ -185,14 +187,14 @@ class PanoramaCamera:
         """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         longitude, latitude = self._angles(x, y)
-        level = np.cos(latitude)
-        return np.stack([level * np.sin(longitude), np.sin(latitude), -level * np.cos(longitude)], axis=-1)
+        (level, rise), (ahead, aside) = cos_sin(latitude), cos_sin(longitude)
+        return by_component(level * aside, rise, -level * ahead)
 
     def component(self, x: ArrayLike, y: ArrayLike, vector: Array) -> Array:
         """Return the component along `vector`, shape (3,), of the unit vectors seen at x, y, which may broadcast."""
         longitude, latitude = self._angles(x, y)
-        level = vector[0] * np.sin(longitude) - vector[2] * np.cos(longitude)
-        along: Array = np.cos(latitude) * level + vector[1] * np.sin(latitude)
+        (level, rise), (ahead, aside) = cos_sin(latitude), cos_sin(longitude)
+        along: Array = level * (vector[0] * aside - vector[2] * ahead) + vector[1] * rise
         return along
 
     def pixels(self, directions: Array) -> tuple[Array, Array]:

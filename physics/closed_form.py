@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .polar import PolarMotion
 from .quadrature import direct_integrals, turning_integrals
-from .rays import Array, Rays
+from .rays import Array, Rays, indices
 from .trapped import Barrier
 
 
@@ -16,16 +16,16 @@ def sky_directions(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Arra
     """Return the unit vectors, shape (n, 3), that rays from the sky come from, and which could be answered, (n,)."""
     motion = PolarMotion.of(rays)
     answered = motion.usable(tolerance)
-    time, psi = np.zeros(len(rays)), np.zeros(len(rays))
-    for chosen, integrals in (
-        (np.flatnonzero(answered & barrier.blocks), turning_integrals),
-        (np.flatnonzero(answered & ~barrier.blocks), direct_integrals),
+    time, psi = np.full((2, len(rays)), np.nan)
+    for members, integrals in (
+        (answered & barrier.blocks, turning_integrals),
+        (answered & ~barrier.blocks, direct_integrals),
     ):
-        if len(chosen):
-            time[chosen], psi[chosen], too_many = integrals(rays.select(chosen), barrier.select(chosen), tolerance)
-            answered[chosen[too_many]] = False
-    direction = np.full((len(rays), 3), np.nan)
-    left = np.flatnonzero(answered)
-    if len(left):
-        direction[left] = motion.select(left).direction(time[left], psi[left], tolerance).T
-    return direction, answered
+        if members.any():
+            chosen = indices(members)
+            time[chosen], psi[chosen] = integrals(rays.select(chosen), barrier.select(chosen), tolerance)
+    answered &= ~np.isnan(time)
+    direction = np.full((3, len(rays)), np.nan)
+    left = indices(answered)
+    direction[:, left] = motion.select(left).direction(time[left], psi[left], tolerance)
+    return direction.T, answered

@@ -51,7 +51,10 @@ _NODES = tuple(0.5 * (1.0 + node) for node in (-_OUTER, -_INNER, 0.0, _INNER, _O
 _SMALL, _LARGE = ((322.0 + sign * 13.0 * math.sqrt(70.0)) / 1800.0 for sign in (-1.0, 1.0))
 _WEIGHTS = (_SMALL, _LARGE, 64.0 / 225.0, _LARGE, _SMALL)
 
-NEWTON_ROUNDS = 16
+# Rounds of Halley's method for the turning point, at the most, and the relative change after which what is left, about
+# its cube, is below rounding.
+HALLEY_ROUNDS = 16
+HALLEY_CHANGE = 4e-6
 
 
 def radial_polynomial(rays: Rays) -> tuple[Array, Array, Array]:
@@ -255,20 +258,22 @@ def _turning_point(rays: Rays, barrier: Barrier) -> tuple[Array, Array]:
     """Return u_t, shape (n,), and the coefficients g_0 .. g_3 of G, shape (4, n).
 
     The largest root of R lies h above its minimum r_m, with R(r_m) + R''/2 h^2 + 4 r_m h^3 + h^4 = 0. All
-    terms but the first are positive and convex, so each alone bounds h from above and Newton's method comes
-    down from the least bound without passing the root; written in h, it keeps its digits for the
-    nearly double roots next to the critical curve.
+    terms but the first grow with h, so each alone bounds the root from above; their bounds, put together as reciprocal
+    cubes, are within some per cent of it, and Halley's method does the rest. Written in h, the equation keeps its
+    digits for the nearly double roots next to the critical curve.
     """
     r_m, half, depth = barrier.radius, barrier.curvature, -barrier.height
     with np.errstate(divide="ignore"):
-        h = np.minimum(np.sqrt(depth / half), np.minimum(np.cbrt(depth / (4.0 * r_m)), np.sqrt(np.sqrt(depth))))
+        square, fourth = half / depth, 1.0 / np.sqrt(depth)
+        h = 1.0 / np.cbrt(square * np.sqrt(square) + 4.0 * r_m / depth + fourth * np.sqrt(fourth))
     h = np.minimum(h, np.maximum(rays.observer.r - r_m, np.finfo(float).tiny))
-    for _ in range(NEWTON_ROUNDS):
+    for _ in range(HALLEY_ROUNDS):
         excess = h * h * (half + h * (4.0 * r_m + h)) - depth
         slope = h * (2.0 * half + h * (12.0 * r_m + 4.0 * h))
-        change = excess / slope
-        h = np.maximum(h - change, 0.5 * h)
-        if np.all(np.abs(change) <= 4.0 * np.finfo(float).eps * h):
+        bend = half + h * (12.0 * r_m + 6.0 * h)  # half of the second derivative
+        change = excess * slope / (slope * slope - excess * bend)
+        h -= change
+        if np.all(np.abs(change) <= HALLEY_CHANGE * h):
             break
     r_t = r_m + h
     u_t = 1.0 / r_t

@@ -171,9 +171,9 @@ class Painting:
             yield
 
     def _interpolate_group(self, tiles: Tiles, coefficients: Array) -> None:
-        vectors = interpolate(coefficients, tiles.side, self._view.hole_to_world).astype(np.float32)
-        theta = np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
-        phi = wrapped(np.arctan2(vectors[:, 1], vectors[:, 0]))
+        x, y, z = interpolate(coefficients, tiles.side, self._view.hole_to_world)
+        theta = np.arctan2(np.sqrt(x * x + y * y), z)
+        phi = wrapped(np.arctan2(y, x))
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         for i in range(len(tiles)):
@@ -227,7 +227,7 @@ class Painting:
         corner_x = tiles.column[:, None, None] + steps + 0.0 * steps[:, None]
         corner_y = tiles.row[:, None, None] + steps[:, None] + 0.0 * steps
         corners = self._view.edge(corner_x, corner_y)
-        marked = near_edge(corners)[:, 1:-1, 1:-1]
+        marked = near_edge(corners)
         visibility = (corners[:, 1:-2, 1:-2] > 0.0).astype(np.float64)
         x, y = (np.broadcast_to(each + 0.5, visibility.shape).copy() for each in (columns, rows))
         tile, row, column = np.nonzero(marked)
@@ -259,6 +259,7 @@ def _pool(mask: Mask, cells: int) -> Mask:
 
 def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
     """Return angles from -pi to 2 pi brought to [0, 2 pi) in single precision, which rounds some up to 2 pi itself."""
-    turn = np.float32(2.0 * math.pi)
-    single = np.where(phi < 0.0, phi + 2.0 * math.pi, phi).astype(np.float32)
-    return np.where(single >= turn, np.float32(0.0), single)
+    turn = 2.0 * math.pi
+    single = (phi + (phi < 0.0) * phi.dtype.type(turn)).astype(np.float32)
+    single *= single < np.float32(turn)
+    return single

@@ -27,12 +27,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .rays import Array, Rays
-from .sphere import spherical_triad
+from .rays import Array, Indices, Rays, indices
+from .sphere import cos_sin, spherical_triad
 
 # Rays are sorted by e into classes up to these, each with as many terms as its upper end needs, so that what becomes of
 # a ray does not depend on its company. Beyond the last the series is no longer a short one.
-ELLIPTICITY_CLASSES = (0.0, 0.01, 0.05, 0.3)
+ELLIPTICITY_CLASSES = (0.0, 0.04, 0.3)
 MOST_TERMS = 12
 # Powers of e kept beyond the last harmonic: a harmonic k is made of the powers k, k + 2, ...
 EXTRA_POWERS = 2
@@ -96,16 +96,18 @@ class PolarMotion:
 
     def direction(self, mino_time: Array, rotation: Array, tolerance: float) -> Array:
         """Return the unit vectors after `mino_time`, turned about the axis by `rotation` more, shape (3, n)."""
-        classes = np.searchsorted(ELLIPTICITY_CLASSES, self.ellipticity)
-        direction = np.empty((3, len(classes)))
-        for number, largest in enumerate(ELLIPTICITY_CLASSES):
-            members = np.flatnonzero(classes == number)
-            if len(members):
-                part = self.select(members)
-                direction[:, members] = part._direction(mino_time[members], rotation[members], largest, tolerance)
+        direction = np.empty((3, len(mino_time)))
+        below = np.zeros(len(mino_time), dtype=bool)
+        for largest in ELLIPTICITY_CLASSES:
+            members = (self.ellipticity <= largest) & ~below
+            if members.any():
+                chosen = indices(members)
+                part = self.select(chosen)
+                direction[:, chosen] = part._direction(mino_time[chosen], rotation[chosen], largest, tolerance)
+                below |= members
         return direction
 
-    def select(self, chosen: NDArray[np.intp]) -> PolarMotion:
+    def select(self, chosen: Indices) -> PolarMotion:
         """Return the motion of the chosen rays alone."""
         names = ("tangent_theta", "tangent_phi", "base", "pole_speed", "b", "mean", "ellipticity")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
@@ -127,17 +129,19 @@ class PolarMotion:
         target = mino_time * np.sqrt(self.mean)
         target += _harmonics(coefficients, *start)
         angle = target / coefficients[0]
-        # The first guess lacks the harmonics at the end, e / 4 and little more; a round of Newton's method, whose
-        # function has a second derivative of e, leaves e times the square of that.
+        # The first guess lacks the harmonics at the end, e / 4 and little more; a round of Halley's method, whose
+        # function has derivatives beyond the first of e and 2 e, leaves 2 e times the cube of that at most.
         error = 0.3 * largest
         while error > 0.1 * tolerance:
-            even, odd = phase(np.cos(angle), np.sin(angle))
+            even, odd = phase(*cos_sin(angle))
             excess = coefficients[0] * angle + _harmonics(coefficients, even, odd)
             excess -= target
-            excess *= np.sqrt(1.0 - even)
-            angle -= excess
-            error = largest * error * error
-        cos, sin = np.cos(angle), np.sin(angle)
+            square = 1.0 / (1.0 - even)
+            excess /= np.sqrt(square)
+            # f' = (1 - even)^(-1/2), f'' / (2 f') = -odd / (2 (1 - even))
+            angle -= excess / (1.0 + 0.5 * odd * square * excess)
+            error = 2.0 * largest * error**3
+        cos, sin = cos_sin(angle)
         turn = rotation
         if a2 > 0.0:
             drift = _turn_series(self.pole_speed / np.sqrt(self.mean), self.ellipticity, len(coefficients))
@@ -149,7 +153,7 @@ class PolarMotion:
         x, y, z = (
             n_0 * cos + theta_hat * along_theta + phi_hat * along_phi for n_0, theta_hat, phi_hat in self.triad.T
         )
-        cos, sin = np.cos(turn), np.sin(turn)
+        cos, sin = cos_sin(turn)
         return np.stack([x * cos - y * sin, x * sin + y * cos, z])
 
 

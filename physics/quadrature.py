@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 
 from .metric import horizon_radius
 from .mino import direct_polynomial, radial_polynomial, turning_polynomial
-from .rays import Array, Rays
+from .rays import Array, Indices, Rays
 from .trapped import Barrier
 
 Index = NDArray[np.intp]
 
-# The rules that are used: rays are sorted into classes by the nodes that they need. Nine rays of ten need 8 or 10; the
-# others are so few that a call for each class costs more than nodes that are not needed.
-NODE_COUNTS = (6, 8, 10, 16, 32, 64, 128)
+# The rules that are used: rays are sorted into classes by the nodes that they need. At the default tolerance nine of
+# ten need 7 to 10; the others are so few that more classes would cost more than nodes that are not needed.
+USUAL_NODES = 10
+NODE_COUNTS = (USUAL_NODES, 16, 32, 64, 128)
 
 MOST_NODES_ONE_BY_ONE = 10
 
@@ -83,8 +84,8 @@ class _Integrand:
     """Where psi' has its pole: +-i horizon for rays with a turning point, else x = -horizon, below the start."""
 
 
-def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array, Index]:
-    """Return Mino time to infinity and psi, shape (n,), of rays with a turning point, and which need too many nodes."""
+def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array]:
+    """Return Mino time to infinity and psi, shape (n,), of rays with a turning point; NaN where it takes too many nodes."""
     start, turning, rates = turning_polynomial(rays, barrier)
     # The root of G next to 0 < s on the left, from its first terms: next to the critical curve it is close to 0.
     g0, g1, g2, _ = rates
@@ -103,8 +104,8 @@ def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[A
     return _integrals(integrand, needed, crowded_goal)
 
 
-def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array, Index]:
-    """Return Mino time to infinity and psi, shape (n,), of rays that go straight out, and which need too many nodes."""
+def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array]:
+    """Return Mino time to infinity and psi, shape (n,), of rays that go straight out; NaN where it takes too many nodes."""
     start, unit, rates = direct_polynomial(rays, barrier)
     # No root of the polynomial is nearer to x = 0 than this: none of its four terms can reach a quarter of the first.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -155,15 +156,22 @@ def _nodes(goal: float, axes: Array) -> Array:
     return nodes
 
 
-def _integrals(integrand: _Integrand, needed: Array, crowded_goal: float) -> tuple[Array, Array, Index]:
-    """Return both integrals and the rays that need too many nodes; `needed` is the number of plain ones."""
-    count = len(needed)
-    time, psi = np.full(count, np.nan), np.full(count, np.nan)
+def _integrals(integrand: _Integrand, needed: Array, crowded_goal: float) -> tuple[Array, Array]:
+    """Return both integrals, NaN where they take too many nodes; `needed` is the number of plain ones."""
+    start = integrand.start
     plain = needed <= MOST_PLAIN_NODES
     crowded = np.flatnonzero(~plain)
+    usual = needed <= USUAL_NODES
+    if 2 * np.count_nonzero(usual) > len(needed):
+        # Where most rays need the usual rule, it costs less to apply it to all than to pick them out.
+        time, psi = _apply(USUAL_NODES, integrand, slice(None), start, np.ones_like(start), None)
+        time[crowded] = np.nan
+        plain &= ~usual
+    else:
+        time, psi = np.full((2, len(needed)), np.nan)
     if len(crowded):
-        scale, start = integrand.near[crowded], integrand.start[crowded]
-        low, high, beyond = (np.arcsinh(x / scale) for x in (start, 1.0, integrand.far[crowded]))
+        scale = integrand.near[crowded]
+        low, high, beyond = (np.arcsinh(x / scale) for x in (start[crowded], 1.0, integrand.far[crowded]))
         axes = np.minimum(np.hypot(0.5 * np.pi, low) + np.hypot(0.5 * np.pi, high), 2.0 * beyond - high - low)
         if integrand.argument is np.positive:
             axes = np.minimum(axes, high + low + 2.0 * np.arcsinh(integrand.horizon[crowded] / scale))
@@ -171,70 +179,39 @@ def _integrals(integrand: _Integrand, needed: Array, crowded_goal: float) -> tup
         # A lone singularity at the end of the interval may be better met by plain nodes all the same.
         better = stretched < needed[crowded]
         plain[crowded[~better]] = True
-        inner = crowded[better]
-        _by_class(integrand, inner, stretched[better], low[better], high[better], scale[better], time, psi)
-    index = np.flatnonzero(plain)
-    _by_class(integrand, index, needed[index], integrand.start[index], None, None, time, psi)
-    return time, psi, np.flatnonzero(np.isnan(time))
+        for count, members in _classes(stretched, better):
+            inner = crowded[members]
+            time[inner], psi[inner] = _apply(count, integrand, inner, low[members], high[members], scale[members])
+    for count, members in _classes(needed, plain):
+        low = start[members]
+        time[members], psi[members] = _apply(count, integrand, members, low, np.ones_like(low), None)
+    return time, psi
 
 
-def _by_class(
-    integrand: _Integrand,
-    index: Index,
-    needed: Array,
-    low: Array,
-    high: Array | None,
-    scale: Array | None,
-    time: Array,
-    psi: Array,
-) -> None:
-    """Apply to the rays of `index` the smallest rule that each needs; those that need too many are left alone.
-
-    With a scale, x = scale sinh(t) between t = low and high; without, x itself between low and 1.
-    """
-    classes = np.searchsorted(NODE_COUNTS, needed)
-    order = np.argsort(classes, kind="stable")
-    ends = np.searchsorted(classes[order], np.arange(len(NODE_COUNTS) + 1))
-    index, low = index[order], low[order]
-    high = np.ones(len(index)) if high is None else high[order]
-    scale = None if scale is None else scale[order]
-    rates, unit, b = integrand.rates[:, index], integrand.unit[index], integrand.b[index]
-    for count, first, last in zip(NODE_COUNTS, ends[:-1], ends[1:], strict=True):
-        if first == last:
-            continue
-        part = slice(first, last)
-        time[index[part]], psi[index[part]] = _apply(
-            RULES[count],
-            rates[:, part],
-            unit[part],
-            b[part],
-            integrand.spin,
-            integrand.argument,
-            low[part],
-            high[part],
-            None if scale is None else scale[part],
-        )
+def _classes(needed: Array, among: NDArray[np.bool_]) -> Iterable[tuple[int, Index]]:
+    """Yield each number of nodes with the rays `among` all for which it is the least that is enough."""
+    fewer = 0
+    for count in NODE_COUNTS:
+        members = np.flatnonzero(among & (needed > fewer) & (needed <= count))
+        if len(members):
+            yield count, members
+        fewer = count
 
 
 def _apply(
-    rule: tuple[list[float], list[float]],
-    rates: Array,
-    unit: Array,
-    b: Array,
-    spin: float,
-    argument: Callable[..., Array],
-    low: Array,
-    high: Array,
-    scale: Array | None,
+    count: int, integrand: _Integrand, rays: Indices, low: Array, high: Array, scale: Array | None
 ) -> tuple[Array, Array]:
-    """Return both integrals by one rule, with x = scale sinh(t) between t = low and high where a scale is given."""
+    """Return both integrals of some rays by the rule of `count` nodes, with x = scale sinh(t) between t = low and high
+    where a scale is given, otherwise x itself."""
+    nodes_and_weights = RULES[count]
+    rates, unit, spin, argument = integrand.rates[:, rays], integrand.unit[rays], integrand.spin, integrand.argument
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
-    a2, drag_b = spin * spin, spin * b
+    a2, drag_b = spin * spin, spin * integrand.b[rays]
     time, psi = np.zeros_like(unit), np.zeros_like(unit)
     # Node by node for the rules that most rays need; all nodes at once for the others, whose rays are few.
-    passes: Iterable[tuple[float | Array, float | Array]] = zip(*rule, strict=True)
-    if len(rule[0]) > MOST_NODES_ONE_BY_ONE:
-        passes = [(np.array(rule[0])[:, None], np.array(rule[1])[:, None])]
+    passes: Iterable[tuple[float | Array, float | Array]] = zip(*nodes_and_weights, strict=True)
+    if count > MOST_NODES_ONE_BY_ONE:
+        passes = [(np.array(nodes_and_weights[0])[:, None], np.array(nodes_and_weights[1])[:, None])]
     for nodes, weights in passes:
         x = nodes * half
         x += middle

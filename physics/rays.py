@@ -19,6 +19,7 @@ from .observer import Observer
 from .sphere import unit_vectors
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp] | slice
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Rays:
     def __len__(self) -> int:
         return len(self.b)
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Rays:
+    def select(self, chosen: NDArray[np.bool_] | Indices) -> Rays:
         """Return the chosen rays alone."""
         return Rays(
             self.spin,
@@ -67,6 +68,11 @@ class Rays:
             self.escapes[chosen],
             self.one_plus_z[chosen],
         )
+
+
+def indices(members: NDArray[np.bool_]) -> Indices:
+    """Return the indices of members of shape (n,): a slice where all are, which selects without copying."""
+    return slice(None) if members.all() else np.flatnonzero(members)
 
 
 def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:
@@ -104,11 +110,7 @@ def rays_from_camera(spin: float, observer: Observer, directions: Array) -> Rays
     BlackHoleError
         For a spin out of range or a camera inside the horizon.
     """
-    spin = check_spin(spin)
-    metric = metric_functions(spin, observer.r, observer.theta)
-    doppler, light = _light_in_fido_frame(observer.beta, directions)
-    n_r, n_theta, n_phi = (light @ camera_triad(observer)).T
-    return _rays_from_fido(spin, observer, metric, (n_r, n_theta, n_phi), doppler)
+    return rays_from_axes(spin, observer, directions, camera_triad(observer))
 
 
 def rays_from_triad(spin: float, observer: Observer, looking: Array) -> Rays:
@@ -117,7 +119,27 @@ def rays_from_triad(spin: float, observer: Observer, looking: Array) -> Rays:
     The same as `rays_from_camera` with N expressed not on (e_x, e_y, e_z) but on the FIDO's triad carried
     along by the boost to the camera; shape (n, 3).
     """
-    return rays_from_camera(spin, observer, looking @ camera_triad(observer).T)
+    return rays_from_axes(spin, observer, looking, np.eye(3))
+
+
+def rays_from_axes(spin: float, observer: Observer, directions: Array, axes: Array) -> Rays:
+    """Return the rays that a camera sees along `directions`, given on any axes of its own.
+
+    The same as `rays_from_camera`, with each row of `axes`, shape (3, 3), one axis of the camera's frame on
+    the FIDO's triad carried along by the boost.
+    """
+    spin = check_spin(spin)
+    metric = metric_functions(spin, observer.r, observer.theta)
+    beta, motion = observer.beta, np.array(observer.direction)
+    gamma_inverse = math.sqrt((1.0 - beta) * (1.0 + beta))
+    ahead = 1.0 - beta * (directions @ (axes @ motion))
+    # Eq. 5 on the triad: light runs along -N, contracted across the motion, and beta is added along it.
+    boost = gamma_inverse * np.eye(3) + (1.0 - gamma_inverse) * np.outer(motion, motion)
+    light = -(axes @ boost).T @ directions.T
+    light += (beta * motion)[:, None]
+    light /= ahead
+    ahead /= gamma_inverse
+    return _rays_from_fido(spin, observer, metric, light, ahead)
 
 
 def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
@@ -136,24 +158,14 @@ def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
     return constant, on_x * e_x + on_y * e_y + on_z * e_z
 
 
-def _light_in_fido_frame(beta: float, directions: Array) -> tuple[Array, Array]:
-    """Return the Doppler factor of Eq. 13 and the light's direction of Eq. 5 on (e_x, e_y, e_z)."""
-    gamma_inverse = math.sqrt((1.0 - beta) * (1.0 + beta))
-    along = directions[:, 1]
-    ahead = 1.0 - beta * along
-    light = -gamma_inverse * directions
-    light[:, 1] = beta - along
-    light /= ahead[:, None]
-    return ahead / gamma_inverse, light
-
-
 def _rays_from_fido(
     spin: float,
     observer: Observer,
     metric: MetricFunctions,
-    light: tuple[Array, Array, Array],
+    light: Array,
     doppler: Array,
 ) -> Rays:
+    """Return the rays of light that runs along `light`, on the FIDO's triad, shape (3, n); `doppler` is Eq. 13's."""
     n_r, n_theta, n_phi = light
     # Energy at infinity for unit energy in the FIDO's frame, 1/E_f of Eq. 7; inside the ergosphere it can
     # be zero or negative. It is also alpha / (1 - b omega), the second factor of Eq. 13.

@@ -11,20 +11,40 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
+def cos_sin(angle: Array) -> tuple[Array, Array]:
+    """Return cosine and sine, each to a few units of rounding, from the tangent of half the angle.
+
+    numpy's tangent runs in vector instructions where its sine and cosine do not: one costs a tenth of the others.
+    """
+    half = np.tan(0.5 * angle)
+    square = half * half
+    scale = 1.0 / (1.0 + square)
+    cosine: Array = (1.0 - square) * scale
+    half += half
+    half *= scale
+    return cosine, half
+
+
+def by_component(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
+    """Return vectors of shape (..., 3) that lie in memory component by component, which numpy works through faster."""
+    return np.moveaxis(np.stack(np.broadcast_arrays(x, y, z)), 0, -1)
+
+
 def unit_vectors(theta: ArrayLike, phi: ArrayLike) -> Array:
     """Return (sin t cos p, sin t sin p, cos t), shape (..., 3), of polar and azimuthal angles in radians."""
-    polar, azimuth = np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64)
-    sine = np.sin(polar)
-    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], axis=-1)
+    polar_cos, polar_sin = cos_sin(np.asarray(theta, dtype=np.float64))
+    cosine, sine = cos_sin(np.asarray(phi, dtype=np.float64))
+    return by_component(polar_sin * cosine, polar_sin * sine, polar_cos)
 
 
 def celestial_coordinates(direction: Array) -> tuple[Array, Array]:
     """Return theta in [0, pi] and phi in [0, 2 pi) of vectors of shape (..., 3); NaN where they are NaN."""
     x, y, z = direction[..., 0], direction[..., 1], direction[..., 2]
-    theta = np.arctan2(np.hypot(x, y), z)
-    phi = np.arctan2(y, x) % (2.0 * math.pi)
-    # The remainder of a tiny negative angle rounds up to 2 pi itself.
-    return theta, np.where(phi >= 2.0 * math.pi, 0.0, phi)
+    theta = np.arctan2(np.sqrt(x * x + y * y), z)
+    phi = np.arctan2(y, x)
+    phi = np.where(phi < 0.0, phi + 2.0 * math.pi, phi)
+    # The sum of a tiny negative angle rounds up to 2 pi itself; the same comparison mends -0.
+    return theta, np.where((phi >= 2.0 * math.pi) | (phi == 0.0), 0.0, phi)
 
 
 def spherical_triad(theta: float, phi: float) -> Array:

@@ -16,7 +16,7 @@ from .closed_form import sky_directions
 from .errors import BlackHoleError, Cancelled
 from .mino import DirectRays, TurningRays
 from .observer import Observer
-from .rays import Array, Rays, camera_directions, rays_from_camera
+from .rays import Array, Rays, camera_directions, indices, rays_from_camera
 from .runge_kutta import CASH_KARP, Integration, System, Tableau, integrate
 from .sphere import celestial_coordinates
 from .trapped import Barrier, comes_from_sky, find_barrier
@@ -34,7 +34,7 @@ LARGEST_TOLERANCE = 1e-2
 
 # Rays traced at a time: this bounds the memory (up to 1 kB a ray, for steps). Smaller blocks waste time on the few rays
 # of each that need most work, larger ones leave the cache.
-BLOCK_SIZE = 16384
+BLOCK_SIZE = 32768
 
 # Attempted steps before a ray is given up as UNRESOLVED, where a method takes steps. With Cash-Karp ordinary rays take
 # 5 to 40; each decade of closeness to the critical curve adds some 10 at the default tolerance, up to 150 or so at
@@ -226,20 +226,19 @@ def trace_rays(
     if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
         raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
     fate = np.empty(theta.size, dtype=np.uint8)
-    direction = np.empty((theta.size, 3))
-    one_plus_z = np.empty(theta.size)
+    theta_cs, phi_cs, one_plus_z = np.empty((3, theta.size))
 
     def steps() -> Generator[float, None, None]:
         for block in blocks(theta.size):
             rays = rays_from_camera(spin, observer, camera_directions(theta.flat[block], phi.flat[block]))
-            fate[block], direction[block] = trace_block(rays, tolerance, method, max_steps)
+            fate[block], direction = trace_block(rays, tolerance, method, max_steps)
+            theta_cs[block], phi_cs[block] = celestial_coordinates(direction)
             one_plus_z[block] = np.where(fate[block] == Fate.SKY, rays.one_plus_z, np.nan)
             yield block.stop / theta.size
 
     check_settings(tolerance, method, max_steps)
     rays_from_camera(spin, observer, np.empty((0, 3)))  # a bad spin or place is an error with no rays as well
     drain(steps(), progress, cancel)
-    theta_cs, phi_cs = celestial_coordinates(direction)
     return TraceResult(
         fate.reshape(theta.shape),
         theta_cs.reshape(theta.shape),
@@ -260,13 +259,13 @@ def trace_block(
         Unit vector towards the origin of the light, in the hole's frame; NaN unless SKY.
     """
     barrier = find_barrier(rays)
-    sky = np.flatnonzero(comes_from_sky(rays, barrier))
+    sky = indices(comes_from_sky(rays, barrier))
     fate = np.full(len(rays), Fate.SHADOW, dtype=np.uint8)
-    direction = np.full((len(rays), 3), np.nan)
+    direction = np.full((3, len(rays)), np.nan)
     found, resolved = METHODS[method].trace(rays.select(sky), barrier.select(sky), tolerance, max_steps)
     fate[sky] = np.where(resolved, Fate.SKY, Fate.UNRESOLVED)
-    direction[sky] = found
-    return fate, direction
+    direction[:, sky] = found.T
+    return fate, direction.T
 
 
 def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS) -> None:

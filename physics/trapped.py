@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import BlackHoleError
 from .metric import check_spin, circular_photon_radius, horizon_radius
-from .rays import Array, Rays
+from .rays import Array, Indices, Rays
+from .sphere import cos_sin
 
 # Newton's method at most doubles its digits: this many rounds serve any start.
 NEWTON_ROUNDS = 60
@@ -50,7 +51,7 @@ class Barrier:
     blocks: NDArray[np.bool_]
     """Whether the barrier turns rays back."""
 
-    def select(self, chosen: NDArray[np.intp]) -> Barrier:
+    def select(self, chosen: Indices) -> Barrier:
         """Return the barriers of the chosen rays alone."""
         return Barrier(
             self.radius[chosen],
@@ -72,7 +73,7 @@ def find_barrier(rays: Rays) -> Barrier:
         # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3); below -1 there is no minimum, and the formula, held at
         # -1, gives the inflection of R', sqrt(-A/3).
         cosine = np.maximum(-0.5 * constant / (third * third * third), -1.0)
-        minimum = 2.0 * third * np.cos(np.arccos(cosine) / 3.0)
+        minimum = 2.0 * third * cos_sin(np.arccos(cosine) / 3.0)[0]
     radius = np.where(minimum > 1.0, minimum, 1.0)  # also where third = 0 made it NaN
     exists = (4.0 * linear * linear * linear + 27.0 * constant * constant <= 0.0) & (minimum > 1.0)
     square = radius * radius

@@ -6,20 +6,23 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .observer import Observer
-from .rays import Array, Rays, rays_from_triad, redshift_vector
+from .rays import Array, Rays, rays_from_axes, rays_from_triad, redshift_vector
+from .root_finding import bracketed_roots
 from .shot import WarpMapParameters
-from .sphere import spherical_triad
+from .sphere import by_component, cos_sin, spherical_triad
 from .tracer import BLOCK_SIZE
 from .trapped import edge_function
 
-# Points on the shadow's outline, and rounds of bisection for each. Chords between them stray from it by
-# (2 pi / n)^2 / 8 of its radius of curvature, 5e-6, and pi / 2^rounds is 1e-7: small shares of a pixel of any common
-# picture. Pictures with finer pixels lose nothing but time: what the outline misses, the corners and samples of the
-# tiles find.
+# Points on the shadow's outline, the change of angle, radians, that ends the search for each, and its rounds at the
+# most. Chords between them stray from it by (2 pi / n)^2 / 8 of its radius of curvature, 5e-6: small shares of a pixel
+# of any common picture. Pictures with finer pixels lose nothing but time: what the outline misses, the corners and
+# samples of the tiles find.
 OUTLINE_POINTS = 1024
-OUTLINE_ROUNDS = 25
+OUTLINE_CHANGE = 1e-6
+OUTLINE_ROUNDS = 40
 
 
 class View:
@@ -40,7 +43,7 @@ class View:
     def rays(self, x: Array, y: Array) -> Rays:
         """Return the rays seen at map pixel coordinates x, y, shape (n,)."""
         seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
-        return rays_from_triad(self._spin, self._observer, seen @ self._camera_to_triad)
+        return rays_from_axes(self._spin, self._observer, seen, self._camera_to_triad)
 
     def edge(self, x: Array, y: Array) -> Array:
         """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""
@@ -68,18 +71,20 @@ class View:
         In the FIDO's sky the shadow surrounds the hole's direction, and each great circle from there to the
         opposite point, which is sky, crosses its edge once.
         """
-        turn = np.arange(OUTLINE_POINTS) * (2.0 * math.pi / OUTLINE_POINTS)
+        aside, up = cos_sin(np.arange(OUTLINE_POINTS) * (2.0 * math.pi / OUTLINE_POINTS))
         fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
 
-        def looking(angle: Array) -> Array:
-            return np.stack([-np.cos(angle), np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn)], axis=-1)
+        def looking(angle: Array, part: NDArray[np.intp]) -> Array:
+            cosine, sine = cos_sin(angle)
+            return by_component(-cosine, sine * aside[part], sine * up[part])
 
-        low, high = np.zeros(OUTLINE_POINTS), np.full(OUTLINE_POINTS, math.pi)
-        for _ in range(OUTLINE_ROUNDS):
-            middle = 0.5 * (low + high)
-            sky = edge_function(rays_from_triad(self._spin, fido, looking(middle))) > 0.0
-            low, high = np.where(sky, low, middle), np.where(sky, middle, high)
-        return self._pixels(looking(high))
+        def edge(angle: Array, part: NDArray[np.intp]) -> Array:
+            return edge_function(rays_from_triad(self._spin, fido, looking(angle, part)))
+
+        every = np.arange(OUTLINE_POINTS)
+        ends = np.zeros(OUTLINE_POINTS), np.full(OUTLINE_POINTS, math.pi)
+        values = edge(ends[0], every), edge(ends[1], every)
+        return self._pixels(looking(bracketed_roots(edge, ends, values, OUTLINE_CHANGE, OUTLINE_ROUNDS), every))
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""

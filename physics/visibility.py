@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .rays import Array
+from .root_finding import bracketed_roots
 
 # Cells along each side of a pixel at the edge. A chord across a cell cuts off 1/(8 n^2 R) of the pixel for an edge of
 # radius R pixels: 8e-4 for a shadow 20 pixels wide.
@@ -31,30 +32,57 @@ CENTRE_REACH = 3
 # ray could be traced through.
 SMALLEST_SHARE = 1e-6
 
-# Rounds of the root finder that places the ends of the chords; the function is flat on the shadow's side and steep
-# on the other, where linear interpolation alone would shrink the shadow.
-ROOT_ROUNDS = 5
+# How far the edge may bulge through a pixel's side, in second differences: an eighth, and as much again to be safe.
+BULGE = 0.25
+
+# The ends of the chords: the change, as a share of a cell's side, that ends the root finder, which is left with about
+# the square of it, and its rounds at the most. The function is flat on the shadow's side and steep on the other, where
+# linear interpolation alone would shrink the shadow.
+ROOT_CHANGE = 1e-2
+ROOT_ROUNDS = 8
+
+# The corners a, b, c, d of a cell, (row, column), and its sides and diagonal from corner to corner.
+CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
+SIDES = ((0, 1), (0, 2), (1, 3), (2, 3), (0, 3))
 
 EdgeFunction = Callable[[Array, Array], Array]
 """From pixel coordinates x, y to the signed edge function, positive in the sky; all of shape (n,)."""
 
 
 def near_edge(corners: Array) -> NDArray[np.bool_]:
-    """Return the pixels that the edge may touch, shape (..., h, w), from corner values, shape (..., h + 1, w + 1).
+    """Return the pixels that the edge may touch.
 
-    Those whose corners differ in sign, and their neighbours: the edge may bulge into a pixel through one side.
+    Those whose corners differ in sign, and those into which the edge may bulge through one side: between the ends of
+    a side the function departs from a straight line by an eighth of its second difference.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (..., h + 3, w + 3)
+        The edge function at the corners of h x w pixels and of one more pixel on each side.
+
+    Returns
+    -------
+    ndarray of bool, shape (..., h, w)
     """
-    sky = corners > 0.0
+    sky = corners[..., 1:-1, 1:-1] > 0.0
     touched = sky[..., :-1, :-1] ^ sky[..., 1:, 1:]
     touched |= sky[..., :-1, :-1] ^ sky[..., :-1, 1:]
     touched |= sky[..., :-1, :-1] ^ sky[..., 1:, :-1]
-    grown = touched.copy()
-    grown[..., 1:, :] |= touched[..., :-1, :]
-    grown[..., :-1, :] |= touched[..., 1:, :]
-    wide = grown.copy()
-    wide[..., 1:] |= grown[..., :-1]
-    wide[..., :-1] |= grown[..., 1:]
-    return wide
+    across = _may_bulge(corners[..., 1:-1, :])
+    touched |= across[..., :-1, :] | across[..., 1:, :]
+    down = _may_bulge(corners[..., :, 1:-1].swapaxes(-1, -2)).swapaxes(-1, -2)
+    touched |= down[..., :-1] | down[..., 1:]
+    return touched
+
+
+def _may_bulge(values: Array) -> NDArray[np.bool_]:
+    """Return the sides, shape (..., n), that the edge may cross twice, from a line of corners, shape (..., n + 3)."""
+    bend = np.abs(np.diff(values, 2, axis=-1))
+    size = np.abs(values[..., 1:-1])
+    bulges: NDArray[np.bool_] = np.minimum(size[..., :-1], size[..., 1:]) < BULGE * np.maximum(
+        bend[..., :-1], bend[..., 1:]
+    )
+    return bulges
 
 
 def centre_block(
@@ -109,11 +137,13 @@ def refine(
     y = np.broadcast_to(row[:, None, None] + steps[:, None], (count, cells + 1, cells + 1))
     values = edge(x.ravel(), y.ravel()).reshape(x.shape)
 
-    sky = (values > 0.0).reshape(count, -1)
-    in_cells = np.broadcast_to(sky[:, 0].astype(np.float64)[:, None, None], (count, cells, cells)).copy()
-    mixed = np.flatnonzero(sky.any(axis=1) & ~sky.all(axis=1))
-    if len(mixed):
-        in_cells[mixed] = _cell_shares(x[mixed], y[mixed], values[mixed], edge)
+    sky = values > 0.0
+    corners = [(slice(None), slice(i, cells + i), slice(j, cells + j)) for i, j in CORNERS]
+    in_cells = sky[corners[0]].astype(np.float64)
+    mixed = np.any([sky[corner] != sky[corners[0]] for corner in corners[1:]], axis=0)
+    in_cells[mixed] = _cell_shares(
+        x[corners[0]][mixed], y[corners[0]][mixed], 1.0 / cells, np.stack([values[c][mixed] for c in corners]), edge
+    )
     share = in_cells.mean(axis=(1, 2))
     partial = (share > SMALLEST_SHARE) & (share < 1.0 - SMALLEST_SHARE)
     share = np.where(partial, share, np.round(share))
@@ -134,44 +164,28 @@ def refine(
     return np.where(lost, 0.0, share), inside_x, inside_y
 
 
-def _cell_shares(x: Array, y: Array, values: Array, edge: EdgeFunction) -> Array:
-    """Return the visible share of each cell, shape (n, cells, cells), from its nodes, (n, cells + 1, cells + 1)."""
+def _cell_shares(x: Array, y: Array, size: float, values: Array, edge: EdgeFunction) -> Array:
+    """Return the visible share of cells, shape (n,), from their top left corners and the values at all `CORNERS`.
 
-    def side(start: tuple[slice, ...], end: tuple[slice, ...]) -> Array:
-        return _crossing(x[start], y[start], values[start], x[end], y[end], values[end], edge)
-
-    every, low, high = slice(None), slice(None, -1), slice(1, None)
-    across = side((every, every, low), (every, every, high))  # along rows of nodes
-    down = side((every, low, every), (every, high, every))
-    diagonal = side((every, low, low), (every, high, high))
-    sky = values > 0.0
-    a, b, c, d = sky[:, :-1, :-1], sky[:, :-1, 1:], sky[:, 1:, :-1], sky[:, 1:, 1:]
-    upper = _triangle_share((a, b, d), (across[:, :-1], down[:, :, 1:], 1.0 - diagonal))
-    lower = _triangle_share((a, c, d), (down[:, :, :-1], across[:, 1:], 1.0 - diagonal))
-    return 0.5 * (upper + lower)
-
-
-def _crossing(x0: Array, y0: Array, f0: Array, x1: Array, y1: Array, f1: Array, edge: EdgeFunction) -> Array:
-    """Return where between two nodes the function vanishes, 0 to 1 from the first; NaN where it has one sign.
-
-    The Illinois form of false position (Dowell & Jarratt 1971, BIT 11, 168).
+    Each is halved along its diagonal; where the edge enters and leaves a triangle a chord joins the two places.
     """
-    where = np.full(f0.shape, np.nan)
-    chosen = (f0 > 0.0) != (f1 > 0.0)
-    x, y, width, height = x0[chosen], y0[chosen], (x1 - x0)[chosen], (y1 - y0)[chosen]
-    low, high = np.zeros(x.shape), np.ones(x.shape)
-    f_low, f_high = f0[chosen], f1[chosen]
-    middle = f_low / (f_low - f_high)
-    for _ in range(ROOT_ROUNDS):
-        f_middle = edge(x + middle * width, y + middle * height)
-        same = (f_middle > 0.0) == (f_low > 0.0)
-        # The end that stays has its value halved, so that it cannot stay for ever.
-        f_low, f_high = np.where(same, f_middle, 0.5 * f_low), np.where(same, 0.5 * f_high, f_middle)
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-        gap = f_low - f_high
-        middle = np.where(gap == 0.0, middle, low + (high - low) * f_low / np.where(gap == 0.0, 1.0, gap))
-    where[chosen] = middle
-    return where
+    start, end = np.array(SIDES).T
+    down, right = np.array(CORNERS).T[:, :, None] * size
+    f0, f1 = values[start], values[end]
+    meets = (f0 > 0.0) != (f1 > 0.0)
+    x0, y0 = (x + right[start])[meets], (y + down[start])[meets]
+    width, height = (np.broadcast_to(step[end] - step[start], f0.shape)[meets] for step in (right, down))
+    crossing = np.full(f0.shape, np.nan)
+    crossing[meets] = bracketed_roots(
+        lambda place, part: edge(x0[part] + place * width[part], y0[part] + place * height[part]),
+        (np.zeros(x0.shape), np.ones(x0.shape)),
+        (f0[meets], f1[meets]),
+        ROOT_CHANGE,
+        ROOT_ROUNDS,
+    )
+    ab, ac, bd, cd, ad = crossing
+    a, b, c, d = values > 0.0
+    return 0.5 * (_triangle_share((a, b, d), (ab, bd, 1.0 - ad)) + _triangle_share((a, c, d), (ac, cd, 1.0 - ad)))
 
 
 def _triangle_share(sky: tuple[NDArray[np.bool_], ...], crossing: tuple[Array, ...]) -> Array:

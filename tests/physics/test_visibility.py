@@ -104,13 +104,18 @@ def test_the_point_that_stands_for_a_pixel_is_visible():
     assert edge(x, y)[0] > 0.0
 
 
-def test_near_edge_takes_neighbours_along():
-    corners = np.ones((6, 6))
-    corners[3, 3] = -1.0
-    marked = near_edge(corners)
-    expected = np.zeros((5, 5), dtype=bool)
-    expected[1:5, 1:5] = True
-    assert np.array_equal(marked, expected)
+def test_near_edge_takes_pixels_that_the_edge_only_bulges_into():
+    """Circles of all sizes: every pixel in which finer points see both sides is marked, few others are."""
+    rows, columns = np.mgrid[-1:42, -1:42].astype(float)
+    fine_rows, fine_columns = (np.mgrid[0:400, 0:400] + 0.5) / 10.0
+    for radius in np.linspace(1.5, 18.0, 40):
+        place = 20.0 + 0.5 * np.sin([7.0 * radius, 13.0 * radius])
+        inside = lambda y, x, at=place, r=radius: np.hypot(y - at[0], x - at[1]) - r  # noqa: E731
+        marked = near_edge(inside(rows, columns))
+        sky = (inside(fine_rows, fine_columns) > 0.0).reshape(40, 10, 40, 10)
+        mixed = sky.any(axis=(1, 3)) & ~sky.all(axis=(1, 3))
+        assert not (mixed & ~marked).any()
+        assert marked.sum() <= 1.5 * mixed.sum() + 8
 
 
 def test_near_the_seam_of_a_panorama():
