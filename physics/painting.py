@@ -14,7 +14,7 @@ from .cameras import PanoramaCamera
 from .rays import Array
 from .shot import WarpMapParameters
 from .sphere import celestial_coordinates
-from .tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, tiles_of
+from .tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, sides_for, tiles_of
 from .tracer import BLOCK_SIZE, Fate, trace_block
 from .view import View
 from .visibility import CENTRE_REACH, cells_for_shadow, centre_block, near_edge, refine
@@ -79,10 +79,11 @@ class Painting:
 
     def _adaptive(self) -> Generator[float, None, None]:
         touched, sky = self._survey()
-        waiting = tiles_of(self._width, self._height)
+        sides = sides_for(self._width, self._height)
+        waiting = tiles_of(self._width, self._height, sides[0])
         # Interpolated tiles are quick; most of the time goes into the pixels that are traced at the end.
-        done, share = 0.0, 0.5 / len(TILE_SIDES)
-        for side in TILE_SIDES:
+        done, share = 0.0, 0.5 / len(sides)
+        for side in sides:
             cells = side // TILE_SIDES[-1]
             clear = ~_pool(touched, cells)[waiting.row // side, waiting.column // side]
             seen = _pool(sky, cells)[waiting.row // side, waiting.column // side]

@@ -85,7 +85,7 @@ class _Integrand:
 
 
 def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array]:
-    """Return Mino time to infinity and psi, shape (n,), of rays with a turning point; NaN where it takes too many nodes."""
+    """Return Mino time to infinity and psi, shape (n,), of rays with a turning point; NaN: too many nodes."""
     start, turning, rates = turning_polynomial(rays, barrier)
     # The root of G next to 0 < s on the left, from its first terms: next to the critical curve it is close to 0.
     g0, g1, g2, _ = rates
@@ -105,7 +105,7 @@ def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[A
 
 
 def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Array, Array]:
-    """Return Mino time to infinity and psi, shape (n,), of rays that go straight out; NaN where it takes too many nodes."""
+    """Return Mino time to infinity and psi, shape (n,), of rays that go straight out; NaN: too many nodes."""
     start, unit, rates = direct_polynomial(rays, barrier)
     # No root of the polynomial is nearer to x = 0 than this: none of its four terms can reach a quarter of the first.
     with np.errstate(divide="ignore", invalid="ignore"):

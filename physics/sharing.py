@@ -45,7 +45,7 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     if _without_place(before) != _without_place(parameters):
         return None
     old, new = _Place(before), _Place(parameters)
-    allowed = min(0.5 * parameters.interpolation, PIXEL_SHARE * _pixel_angle(parameters))
+    allowed = min(0.5 * parameters.interpolation, PIXEL_SHARE * parameters.pixel_angle)
     if not old.sees_the_same_as(new, allowed):
         return None
     azimuth = new.phi - old.phi
@@ -69,14 +69,6 @@ def _without_place(parameters: WarpMapParameters) -> WarpMapParameters:
         camera_to_hole=nowhere,
         hole_to_world=nowhere,
     )
-
-
-def _pixel_angle(parameters: WarpMapParameters) -> float:
-    """Return the angle between two neighbouring pixels of the map in the middle of the picture, radians."""
-    camera = parameters.camera
-    x = 0.5 * camera.width + np.array([0.0, 1.0 / parameters.supersampling])
-    one, other = camera.directions(x, np.full(2, 0.5 * camera.height))
-    return float(np.linalg.norm(other - one))
 
 
 class _Place:

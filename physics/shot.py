@@ -115,6 +115,13 @@ class WarpMapParameters:
         """Width and height of the map in pixels."""
         return self.camera.width * self.supersampling, self.camera.height * self.supersampling
 
+    @property
+    def pixel_angle(self) -> float:
+        """Angle between two neighbouring pixels of the map in the middle of the picture, radians."""
+        x = 0.5 * self.camera.width + np.array([0.0, 1.0 / self.supersampling])
+        one, other = self.camera.directions(x, np.full(2, 0.5 * self.camera.height))
+        return float(np.linalg.norm(other - one))
+
     def observer(self) -> Observer:
         """Return the observer that the camera is.
 

@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from .rays import Array
 
 # Sides of the tiles in pixels, each half of the one before; the pixels of the last are traced one by one.
-TILE_SIDES = (128, 64, 32, 16)
+TILE_SIDES = (256, 128, 64, 32, 16)
+# The largest tiles are those that at least this many of cover the picture: fewer would all be divided.
+FEWEST_TILES = 30
 
 # Chebyshev points along each side of a tile, and how many of the highest coefficients tell the error. What is left out
-# was found to be a tenth of their sum or less next to the shadow's edge, up to a third beside a distant hole.
+# was found to be a twentieth of their sum or less next to the shadow's edge, up to a tenth beside a distant hole.
 POINTS = 11
 TAIL = 2
-TAIL_SHARE = 0.5
+TAIL_SHARE = 0.15
 
 Directions = Callable[[Array, Array], Array]
 """From pixel coordinates, shape (n,), to unit vectors in the sky, shape (n, 3); NaN where there is none."""
@@ -65,7 +67,13 @@ class Tiles:
         return self.select((self.column < width) & (self.row < height))
 
 
-def tiles_of(width: int, height: int, side: int = TILE_SIDES[0]) -> Tiles:
+def sides_for(width: int, height: int) -> tuple[int, ...]:
+    """Return the sides of `TILE_SIDES` that are used for a picture of this size, the largest first."""
+    used = tuple(side for side in TILE_SIDES if width * height >= FEWEST_TILES * side * side)
+    return used or TILE_SIDES[-1:]
+
+
+def tiles_of(width: int, height: int, side: int) -> Tiles:
     """Return the tiles of one size that cover a picture."""
     row, column = np.mgrid[0:height:side, 0:width:side]
     return Tiles(side, column.ravel(), row.ravel())

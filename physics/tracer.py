@@ -96,13 +96,13 @@ def stepping(tableau: Tableau, systems: Systems) -> Tracer:
     def trace(rays: Rays, barrier: Barrier, tolerance: float, max_steps: int) -> tuple[Array, NDArray[np.bool_]]:
         direction = np.full((len(rays), 3), np.nan)
         resolved = np.zeros(len(rays), dtype=bool)
-        for indices, system in systems(rays, barrier, tolerance):
-            if not len(indices):
+        for members, system in systems(rays, barrier, tolerance):
+            if not len(members):
                 continue
             outcome = _last(integrate(system, tableau, tolerance, max_steps))
-            resolved[indices] = outcome.reached
+            resolved[members] = outcome.reached
             arrived = system.select(outcome.reached).sky_direction(outcome.state[:, outcome.reached])
-            direction[indices[outcome.reached]] = arrived
+            direction[members[outcome.reached]] = arrived
         return direction, resolved
 
     return trace

@@ -6,23 +6,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .observer import Observer
 from .rays import Array, Rays, rays_from_axes, rays_from_triad, redshift_vector
-from .root_finding import bracketed_roots
 from .shot import WarpMapParameters
 from .sphere import by_component, cos_sin, spherical_triad
 from .tracer import BLOCK_SIZE
 from .trapped import edge_function
 
-# Points on the shadow's outline, the change of angle, radians, that ends the search for each, and its rounds at the
-# most. Chords between them stray from it by (2 pi / n)^2 / 8 of its radius of curvature, 5e-6: small shares of a pixel
-# of any common picture. Pictures with finer pixels lose nothing but time: what the outline misses, the corners and
-# samples of the tiles find.
-OUTLINE_POINTS = 1024
-OUTLINE_CHANGE = 1e-6
-OUTLINE_ROUNDS = 40
+# Points on the shadow's outline, for the square root of the picture's width and height in pixels. Chords between n
+# points stray from it by (2 pi / n)^2 / 8 of its radius: 0.05 pixels where that is width and height together. What the
+# outline of a larger one misses, the corners and samples of the tiles find.
+OUTLINE_DENSITY = 10.0
+# How well the angle of each is known, in pixels.
+OUTLINE_ERROR = 0.02
 
 
 class View:
@@ -35,6 +32,7 @@ class View:
         self._spin = parameters.spin
         self._camera = parameters.camera
         self._per_pixel = 1.0 / parameters.supersampling
+        self._pixel_angle = parameters.pixel_angle
         self._observer = parameters.observer()
         triad = spherical_triad(self._observer.theta, self._observer.phi)
         self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
@@ -71,20 +69,20 @@ class View:
         In the FIDO's sky the shadow surrounds the hole's direction, and each great circle from there to the
         opposite point, which is sky, crosses its edge once.
         """
-        aside, up = cos_sin(np.arange(OUTLINE_POINTS) * (2.0 * math.pi / OUTLINE_POINTS))
+        count = math.ceil(OUTLINE_DENSITY * math.sqrt((self._camera.width + self._camera.height) / self._per_pixel))
+        aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
         fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
 
-        def looking(angle: Array, part: NDArray[np.intp]) -> Array:
+        def looking(angle: Array) -> Array:
             cosine, sine = cos_sin(angle)
-            return by_component(-cosine, sine * aside[part], sine * up[part])
+            return by_component(-cosine, sine * aside, sine * up)
 
-        def edge(angle: Array, part: NDArray[np.intp]) -> Array:
-            return edge_function(rays_from_triad(self._spin, fido, looking(angle, part)))
-
-        every = np.arange(OUTLINE_POINTS)
-        ends = np.zeros(OUTLINE_POINTS), np.full(OUTLINE_POINTS, math.pi)
-        values = edge(ends[0], every), edge(ends[1], every)
-        return self._pixels(looking(bracketed_roots(edge, ends, values, OUTLINE_CHANGE, OUTLINE_ROUNDS), every))
+        low, high = np.zeros(count), np.full(count, math.pi)
+        for _ in range(math.ceil(math.log2(math.pi / (OUTLINE_ERROR * self._pixel_angle)))):
+            middle = 0.5 * (low + high)
+            sky = edge_function(rays_from_triad(self._spin, fido, looking(middle))) > 0.0
+            low, high = np.where(sky, low, middle), np.where(sky, middle, high)
+        return self._pixels(looking(high))
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""

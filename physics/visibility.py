@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .rays import Array
-from .root_finding import bracketed_roots
 
 # Cells along each side of a pixel at the edge. A chord across a cell cuts off 1/(8 n^2 R) of the pixel for an edge of
 # radius R pixels: 8e-4 for a shadow 20 pixels wide.
@@ -176,16 +175,41 @@ def _cell_shares(x: Array, y: Array, size: float, values: Array, edge: EdgeFunct
     x0, y0 = (x + right[start])[meets], (y + down[start])[meets]
     width, height = (np.broadcast_to(step[end] - step[start], f0.shape)[meets] for step in (right, down))
     crossing = np.full(f0.shape, np.nan)
-    crossing[meets] = bracketed_roots(
+    crossing[meets] = _roots(
         lambda place, part: edge(x0[part] + place * width[part], y0[part] + place * height[part]),
-        (np.zeros(x0.shape), np.ones(x0.shape)),
-        (f0[meets], f1[meets]),
-        ROOT_CHANGE,
-        ROOT_ROUNDS,
+        f0[meets],
+        f1[meets],
     )
     ab, ac, bd, cd, ad = crossing
     a, b, c, d = values > 0.0
     return 0.5 * (_triangle_share((a, b, d), (ab, bd, 1.0 - ad)) + _triangle_share((a, c, d), (ac, cd, 1.0 - ad)))
+
+
+def _roots(function: Callable[[Array, NDArray[np.intp]], Array], f_low: Array, f_high: Array) -> Array:
+    """Return where functions, almost straight ones, vanish between 0 and 1, shape (n,).
+
+    The Illinois form of false position (Dowell & Jarratt 1971, BIT 11, 168). `function` takes places and the numbers of
+    the functions that they belong to; `f_low` and `f_high` are its values at 0 and 1, of different signs.
+    """
+    low, high = np.zeros(len(f_low)), np.ones(len(f_low))
+    place = f_low / (f_low - f_high)
+    found, left = place.copy(), np.arange(len(place))
+    for _ in range(ROOT_ROUNDS):
+        if not len(left):
+            break
+        value = function(place, left)
+        same = (value > 0.0) == (f_low > 0.0)
+        # The end that stays has its value halved, so that it cannot stay for ever.
+        f_low, f_high = np.where(same, value, 0.5 * f_low), np.where(same, 0.5 * f_high, value)
+        low, high = np.where(same, place, low), np.where(same, high, place)
+        gap = f_low - f_high
+        better = np.where(gap == 0.0, place, low + (high - low) * (f_low / np.where(gap == 0.0, 1.0, gap)))
+        found[left] = better
+        # Each goes on until it has settled, whatever the others do: it must not depend on its company.
+        going = np.abs(better - place) > ROOT_CHANGE
+        left, place = left[going], better[going]
+        low, high, f_low, f_high = low[going], high[going], f_low[going], f_high[going]
+    return found
 
 
 def _triangle_share(sky: tuple[NDArray[np.bool_], ...], crossing: tuple[Array, ...]) -> Array:

@@ -99,7 +99,7 @@ def test_a_field_with_a_kink_is_not_taken_for_smooth():
 
 def test_tiles_cover_each_pixel_once():
     cover = np.zeros((77, 333), dtype=int)
-    tiles = tiles_of(333, 77)
+    tiles = tiles_of(333, 77, 64)
     for part in (tiles, tiles.divided().within(333, 77).divided().within(333, 77)):
         cover[:] = 0
         columns, rows = (np.broadcast_to(each, (len(part), part.side, part.side)) for each in part.pixels())
