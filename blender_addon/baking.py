@@ -5,7 +5,9 @@ A generator is resumed from Blender's event loop, where undo or a newly loaded f
 datablock since the last time. So it holds names, and looks the scene up each time.
 """
 
-from collections.abc import Generator, Iterable
+import functools
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,9 +18,11 @@ from ._physics import physics
 from .compositor_tree import find_setup
 from .errors import SceneError
 
-# The map that was traced last. Frames of an orbit see the same sky turned about the hole's axis: their maps are made
-# from this one, always the same one, so that errors do not add up.
-_traced: "physics.WarpMap | None" = None
+# What the maps of one bake or render have in common is kept here.
+_baker = physics.MapBaker()
+
+# How long a step waits for a map that is being written, seconds.
+WAIT = 0.02
 
 
 @dataclass(frozen=True)
@@ -65,27 +69,21 @@ def bake_map(
 ) -> Generator[float, None, "physics.WarpMap"]:
     """Bake one map into a file; yields the fraction done, and returns the map.
 
-    It is traced, or made from the map that was traced last where only the camera's azimuth differs.
-
     Raises
     ------
     physics.BlackHoleError
         The parameters are impossible, or the file cannot be written.
     """
-    global _traced
     maps.prepare(path, parameters.map_size)
-    warp_map = None if _traced is None else physics.turned_map(_traced, parameters)
-    if warp_map is None:
-        warp_map = yield from physics.bake_steps(parameters)
-        _traced = warp_map
+    warp_map = yield from _baker.steps(parameters)
     physics.write_warp_map(path, warp_map)
     return warp_map
 
 
-def forget_traced_map() -> None:
-    """Free the memory of the map that was traced last, when a bake or a render is over."""
-    global _traced
-    _traced = None
+def forget_shared_rays() -> None:
+    """Free the memory of what maps have in common, when a bake or a render is over."""
+    global _baker
+    _baker = physics.MapBaker()
 
 
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
@@ -117,41 +115,61 @@ def bake_frames(
     """
     wanted = list(frames)
     summary = Summary()
-    for index, frame in enumerate(wanted):
-        scene = bpy.data.scenes.get(scene_name)
-        if scene is None:
-            raise SceneError(f'Scene "{scene_name}" is gone: baking has stopped.')
-        text = f"Frame {frame}" + (f" ({index + 1} of {len(wanted)})" if len(wanted) > 1 else "")
-        try:
-            layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
-            frame_shot = shot.read_at(scene, frame, layer)
-            path = path_of(scene, frame_shot)
-            summary.folder = maps.folder(scene)
-            yield Progress(frame, index / len(wanted), text)
-            if maps.is_fresh(path, frame_shot.parameters):
-                summary.reused.append(frame)
-                continue
-            steps = bake_map(path, frame_shot.parameters)
-            while True:
-                try:
-                    fraction = next(steps)
-                except StopIteration as end:
-                    summary.unresolved += end.value.counts.get("unresolved", 0)
-                    break
-                yield Progress(frame, (index + fraction) / len(wanted), text)
+    with physics.Background() as writing:
+        for index, frame in enumerate(wanted):
+            scene = bpy.data.scenes.get(scene_name)
+            if scene is None:
+                raise SceneError(f'Scene "{scene_name}" is gone: baking has stopped.')
+            text = f"Frame {frame}" + (f" ({index + 1} of {len(wanted)})" if len(wanted) > 1 else "")
+            with _naming(frame, len(wanted)):
+                layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+                frame_shot = shot.read_at(scene, frame, layer)
+                path = path_of(scene, frame_shot)
+                summary.folder = maps.folder(scene)
+                yield Progress(frame, index / len(wanted), text)
+                if maps.is_fresh(path, frame_shot.parameters):
+                    summary.reused.append(frame)
+                    continue
+                maps.prepare(path, frame_shot.parameters.map_size)
+                steps = _baker.steps(frame_shot.parameters)
+                while True:
+                    try:
+                        fraction = next(steps)
+                    except StopIteration as end:
+                        warp_map = end.value
+                        break
+                    yield Progress(frame, (index + fraction) / len(wanted), text)
+            summary.unresolved += warp_map.counts.get("unresolved", 0)
+            while not writing.wait(WAIT):
+                yield Progress(frame, (index + 1) / len(wanted), text)
+            writing.start(functools.partial(_write, path, warp_map, frame, len(wanted)))
             summary.baked.append(frame)
-        except physics.BlackHoleError as error:
-            prefix = f"Frame {frame}: "
-            if len(wanted) == 1 or str(error).startswith(prefix):
-                raise
-            raise SceneError(prefix + str(error)) from error
+        while not writing.wait(WAIT):
+            yield Progress(wanted[-1], 1.0, "Writing")
     finish(scene_name)
     return summary
 
 
+@contextmanager
+def _naming(frame: int, count: int) -> Iterator[None]:
+    """Name the frame in what goes wrong, where there are several."""
+    try:
+        yield
+    except physics.BlackHoleError as error:
+        prefix = f"Frame {frame}: "
+        if count == 1 or str(error).startswith(prefix):
+            raise
+        raise SceneError(prefix + str(error)) from error
+
+
+def _write(path: Path, warp_map: "physics.WarpMap", frame: int, count: int) -> None:
+    with _naming(frame, count):
+        physics.write_warp_map(path, warp_map)
+
+
 def finish(scene_name: str) -> None:
     """Let the compositor see new maps."""
-    forget_traced_map()
+    forget_shared_rays()
     scene = bpy.data.scenes.get(scene_name)
     if scene is not None and find_setup(scene) is not None:
         sync.refresh(scene)

@@ -111,7 +111,7 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     older map would then hide the magenta.
     """
     _restore_device(scene)
-    baking.forget_traced_map()
+    baking.forget_shared_rays()
     if scene.name in _waiting:  # cancelled half-way
         _waiting.discard(scene.name)
         sync.refresh(scene)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rays of light around a spinning (Kerr) black hole, and the warp maps made of them."""
 
+from .background import Background
 from .cameras import PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
-from .sharing import turned_map
+from .sharing import MapBaker, turned_map
 from .shot import (
     DEFAULT_INTERPOLATION,
     MOTIONS,
@@ -24,10 +25,12 @@ __all__ = [
     "METHODS",
     "MOTIONS",
     "SUPERSAMPLING",
+    "Background",
     "BlackHoleError",
     "Cancelled",
     "Fate",
     "ImageFileError",
+    "MapBaker",
     "Observer",
     "PanoramaCamera",
     "PerspectiveCamera",

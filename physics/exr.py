@@ -7,6 +7,7 @@ import contextlib
 import io
 import os
 import tempfile
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,30 @@ STRUCTURAL_ATTRIBUTES = frozenset(
     "channels compression dataWindow displayWindow lineOrder pixelAspectRatio screenWindowCenter screenWindowWidth "
     "type name version chunkCount tiles".split()
 )
+
+
+# More threads than this bring little: the checksum and the disk remain.
+MOST_THREADS = 8
+
+_library = threading.Lock()
+
+
+@contextlib.contextmanager
+def _library_threads() -> Iterator[None]:
+    """Let OpenEXR compress on all cores, for as long as the block lasts; one block at a time.
+
+    Its threads are ended again: left alive, they would have to be ended while the process ends, in any order.
+    """
+    set_count = getattr(OpenEXR, "set_global_thread_count", None)  # 3.3 has none
+    if set_count is None:
+        yield
+        return
+    with _library:
+        set_count(min(os.cpu_count() or 1, MOST_THREADS))
+        try:
+            yield
+        finally:
+            set_count(0)
 
 
 @contextlib.contextmanager
@@ -101,7 +126,7 @@ def write_channels(
     expected = None
     with replacing(path) as temporary:
         try:
-            with OpenEXR.File(header, dict(channels)) as file:
+            with _library_threads(), OpenEXR.File(header, dict(channels)) as file:
                 file.write(str(temporary))
             expected = temporary.stat().st_size
         except RuntimeError as error:
@@ -137,7 +162,7 @@ def read_channels(path: PathLike) -> tuple[dict[str, NDArray[Any]], dict[str, An
     ImageFileError
         When the file is missing or damaged.
     """
-    with _opened(path, header_only=False) as file:
+    with _library_threads(), _opened(path, header_only=False) as file:
         return {name: channel.pixels for name, channel in file.channels().items()}, _attributes(file)
 
 

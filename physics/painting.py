@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from .cameras import PanoramaCamera
 from .rays import Array
 from .shot import WarpMapParameters
+from .sky_table import SkyTable
 from .sphere import celestial_coordinates
 from .tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, sides_for, tiles_of
-from .tracer import BLOCK_SIZE, Fate, trace_block
+from .tracer import BLOCK_SIZE, trace_block
 from .view import View
 from .visibility import CENTRE_REACH, cells_for_shadow, centre_block, near_edge, refine
 
@@ -39,10 +40,11 @@ Mask = NDArray[np.bool_]
 
 
 class Painting:
-    """A warp map in the making."""
+    """A warp map in the making; with a table of the same place it traces only what that leaves open."""
 
-    def __init__(self, parameters: WarpMapParameters) -> None:
+    def __init__(self, parameters: WarpMapParameters, table: SkyTable | None = None) -> None:
         self._parameters = parameters
+        self._table = table
         self._view = View(parameters)
         self._width, self._height = parameters.map_size
         shape = (self._height, self._width)
@@ -155,11 +157,25 @@ class Painting:
 
     def _directions(self, x: Array, y: Array) -> Array:
         """Return the sky's unit vectors, hole's frame, at map pixel coordinates; NaN in the shadow; shape (n, 3)."""
-        direction = np.empty((len(x), 3))
+        direction = np.empty((3, len(x)))
         for start in range(0, len(x), BLOCK_SIZE):
             block = slice(start, start + BLOCK_SIZE)
-            rays = self._view.rays(x[block], y[block])
-            _, direction[block] = trace_block(rays, self._parameters.tolerance, self._parameters.method)
+            direction[:, block] = self._block_directions(x[block], y[block]).T
+        return direction.T
+
+    def _block_directions(self, x: Array, y: Array) -> Array:
+        """Do what `_directions` does for one block."""
+        if self._table is None:
+            return self._trace_rays(x, y)
+        direction = self._table.directions(self._view.light(x, y), self._view.phi)
+        left = np.flatnonzero(np.isnan(direction[:, 0]))
+        if len(left):
+            direction[left] = self._trace_rays(x[left], y[left])
+        return direction
+
+    def _trace_rays(self, x: Array, y: Array) -> Array:
+        """Return what `_directions` does, a ray for each."""
+        _, direction = trace_block(self._view.rays(x, y), self._parameters.tolerance, self._parameters.method)
         self._rays += len(x)
         return direction
 
@@ -208,16 +224,15 @@ class Painting:
         traced = np.flatnonzero(visibility > 0.0)
         for start in range(0, len(traced), BLOCK_SIZE):
             pixel = traced[start : start + BLOCK_SIZE]
-            rays = self._view.rays(x[pixel], y[pixel])
-            fate, direction = trace_block(rays, self._parameters.tolerance, self._parameters.method)
+            direction = self._block_directions(x[pixel], y[pixel])
             theta, phi = celestial_coordinates(direction @ self._view.hole_to_world.T)
-            lost = fate != Fate.SKY
+            lost = np.isnan(theta)  # a point that sees sky, and whose ray was given up all the same
+            one_plus_z = self._view.one_plus_z(x[pixel], y[pixel])
             place = (rows[pixel], columns[pixel])
             self._theta[place] = np.where(lost, 0.0, theta)
             self._phi[place] = wrapped(np.where(lost, 0.0, phi))
-            self._one_plus_z[place] = np.where(lost, UNRESOLVED_ONE_PLUS_Z, rays.one_plus_z)
+            self._one_plus_z[place] = np.where(lost, UNRESOLVED_ONE_PLUS_Z, one_plus_z)
             self._unresolved += int(np.count_nonzero(lost))
-            self._rays += len(pixel)
             yield 0.2 + 0.8 * (start + len(pixel)) / len(traced)
 
     def _visible_parts(self, tiles: Tiles) -> tuple[Array, Array, Array]:

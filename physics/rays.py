@@ -130,16 +130,38 @@ def rays_from_axes(spin: float, observer: Observer, directions: Array, axes: Arr
     """
     spin = check_spin(spin)
     metric = metric_functions(spin, observer.r, observer.theta)
+    light, doppler = light_in_fido_frame(observer, directions, axes)
+    return _rays_from_fido(spin, observer, metric, light, doppler)
+
+
+def light_in_fido_frame(observer: Observer, directions: Array, axes: Array) -> tuple[Array, Array]:
+    """Return where light runs in the FIDO's frame, and how much redder it is there, by Eqs. 5 and 13.
+
+    Parameters
+    ----------
+    observer : Observer
+    directions : ndarray, shape (n, 3)
+        Unit vectors N, where the camera looks.
+    axes : ndarray, shape (3, 3)
+        As for `rays_from_axes`.
+
+    Returns
+    -------
+    light : ndarray, shape (3, n)
+        Unit vectors on (r-hat, theta-hat, phi-hat): the FIDO looks along their negatives to see the same light.
+    doppler : ndarray, shape (n,)
+        f_FIDO / f_camera.
+    """
     beta, motion = observer.beta, np.array(observer.direction)
     gamma_inverse = math.sqrt((1.0 - beta) * (1.0 + beta))
     ahead = 1.0 - beta * (directions @ (axes @ motion))
-    # Eq. 5 on the triad: light runs along -N, contracted across the motion, and beta is added along it.
+    # Light runs along -N, contracted across the motion, and beta is added along it.
     boost = gamma_inverse * np.eye(3) + (1.0 - gamma_inverse) * np.outer(motion, motion)
     light = -(axes @ boost).T @ directions.T
     light += (beta * motion)[:, None]
     light /= ahead
     ahead /= gamma_inverse
-    return _rays_from_fido(spin, observer, metric, light, ahead)
+    return light, ahead
 
 
 def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:

@@ -1,26 +1,62 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames that share their rays: the same sky, turned about the spin axis.
+"""Frames that share their rays.
 
 Space around the hole looks the same from every azimuth. When only the camera's azimuth changes from one frame to
 the next, as on a circular orbit with the camera tracking the hole, or when hole and camera are turned together, each
-pixel's ray is the same but for a rotation of where it comes from: one map serves for all such frames.
+pixel's ray is the same but for a rotation of where it comes from: one map serves for all such frames. When the camera
+stays at one radius and polar angle but turns, zooms or changes its speed, the pixels see other directions of one sky,
+and a table of that sky serves them (see `sky_table`).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Generator
 
 import numpy as np
 
 from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
+from .sky_table import SkyTable, same_place
 from .sphere import celestial_coordinates, spherical_triad, unit_vectors
-from .warp_map import WarpMap
+from .warp_map import WarpMap, bake_steps
 
 # Difference between cameras that counts as none, in pixels.
 PIXEL_SHARE = 0.01
+
+
+class MapBaker:
+    """Bakes the maps of a shot one after another, with what they have in common traced once.
+
+    A map is made from an earlier one by a rotation where that is possible, and from a table of the sky from the second
+    map on that is seen from one place. Either way its errors stay within the tolerance that its parameters allow to
+    interpolation; with an `interpolation` of 0 every map is traced whole. Moves that share nothing cost nothing more.
+    """
+
+    def __init__(self) -> None:
+        self._traced: WarpMap | None = None
+        self._table: SkyTable | None = None
+
+    def steps(self, parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
+        """Bake one map as `bake_steps` does."""
+        if self._traced is not None:
+            turned = turned_map(self._traced, parameters)
+            if turned is not None:
+                return turned
+        traced = yield from bake_steps(parameters, self._table_for(parameters))
+        self._traced = traced
+        return traced
+
+    def _table_for(self, parameters: WarpMapParameters) -> SkyTable | None:
+        if parameters.interpolation == 0.0 or self._traced is None:
+            return None
+        parameters.validate()
+        if self._table is None or not self._table.serves(parameters):
+            before = WarpMapParameters.from_metadata(self._traced.metadata["parameters"])
+            self._table = SkyTable(parameters) if same_place(before, parameters) else None
+        return self._table
 
 
 def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from .observer import Observer
-from .rays import Array, Rays, rays_from_axes, rays_from_triad, redshift_vector
+from .rays import Array, Rays, light_in_fido_frame, rays_from_axes, rays_from_triad, redshift_vector
 from .shot import WarpMapParameters
 from .sphere import by_component, cos_sin, spherical_triad
 from .tracer import BLOCK_SIZE
@@ -37,11 +37,19 @@ class View:
         triad = spherical_triad(self._observer.theta, self._observer.phi)
         self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
         self.hole_to_world = np.array(parameters.hole_to_world)
+        self.phi = self._observer.phi
+        """The camera's azimuth about the spin axis, radians."""
 
     def rays(self, x: Array, y: Array) -> Rays:
         """Return the rays seen at map pixel coordinates x, y, shape (n,)."""
         seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
         return rays_from_axes(self._spin, self._observer, seen, self._camera_to_triad)
+
+    def light(self, x: Array, y: Array) -> Array:
+        """Return where the light seen at map pixel coordinates x, y, shape (n,), runs in the FIDO's frame, (3, n)."""
+        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        light, _ = light_in_fido_frame(self._observer, seen, self._camera_to_triad)
+        return light
 
     def edge(self, x: Array, y: Array) -> Array:
         """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""

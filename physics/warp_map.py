@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .painting import Painting
 from .shot import WarpMapParameters
+from .sky_table import SkyTable
 from .tracer import Cancel, Progress, drain
 
 Image = NDArray[np.float32]
@@ -62,8 +63,10 @@ def bake(
     return drain(bake_steps(parameters), progress, cancel)
 
 
-def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
+def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> Generator[float, None, WarpMap]:
     """Trace a warp map step by step: yields the fraction done after each block of rays, returns the map.
+
+    A table of the same place, see `SkyTable.serves`, stands for most of the rays.
 
     The steps take some tens of milliseconds each, so that a window can be kept alive between them.
 
@@ -73,7 +76,7 @@ def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]
         Before the first step, when no map can be made from these parameters.
     """
     parameters.validate()
-    painting = Painting(parameters)
+    painting = Painting(parameters, table)
     yield from painting.steps()
     metadata = {"hash": parameters.hash, "counts": painting.counts(), "parameters": parameters.to_metadata()}
     return WarpMap(*painting.planes, metadata)
