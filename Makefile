@@ -3,6 +3,7 @@
 
 DEMO_FOLDER ?= build/demo
 PYTEST_ARGUMENTS ?=
+BENCHMARK_ARGUMENTS ?=
 
 # Prints the environment's Python, and makes the environment first where it is missing or out of date.
 environment = interpreter=$$(.ci/find_python "$(PYTHON)") && python=$$("$$interpreter" .ci/environment.py)
@@ -14,7 +15,7 @@ help:
 	@echo "make test       run the tests"
 	@echo "make lint       style, types, and the rule that physics knows nothing of Blender"
 	@echo "make extension  build the extension for Blender into build/"
-	@echo "make benchmark  measure the tracer and the baking of a 1080p map"
+	@echo "make benchmark  measure tracing, maps, files and animations (a table and plots in build/benchmark)"
 	@echo "PYTHON=/path/to/python chooses the interpreter: 3.11 runs Blender 4.5, 3.13 runs Blender 5.2"
 
 environment:
@@ -34,7 +35,7 @@ extension:
 	@$(environment) && "$$python" .ci/build_extension.py && "$$python" .ci/build_extension.py --split-platforms
 
 benchmark:
-	@$(environment) && for script in benchmarks/bench_*.py; do PYTHONPATH=. "$$python" "$$script" || exit 1; done
+	@$(environment) && PYTHONPATH=. "$$python" benchmarks/run.py $(BENCHMARK_ARGUMENTS)
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache .mypy_cache .import_linter_cache

@@ -137,7 +137,7 @@ def _bake(options: argparse.Namespace) -> None:
     warp_map = bake(parameters, progress=_ProgressPrinter())
     write_warp_map(options.output, warp_map)
     counts = dict(warp_map.counts)
-    rays = counts.pop("rays")
+    rays = counts.pop("rays") + counts.pop("shared")
     pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
     print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels from {rays} rays")
     unresolved = warp_map.counts["unresolved"]

@@ -52,6 +52,7 @@ class Painting:
         self._one_plus_z = np.full(shape, SHADOW_ONE_PLUS_Z, np.float32)
         self._unresolved = 0
         self._rays = 0
+        self._shared = 0
 
     @property
     def planes(self) -> tuple[Image, Image, Image, Image]:
@@ -59,7 +60,7 @@ class Painting:
         return self._theta, self._phi, self._one_plus_z, self._visibility
 
     def counts(self) -> dict[str, int]:
-        """Number of pixels by what they see, and of the rays that were traced for them."""
+        """Number of pixels by what they see, of the rays traced for them, and of those that a table stood for."""
         whole = int(np.count_nonzero(self._visibility == 1.0))
         dark = int(np.count_nonzero(self._visibility == 0.0))
         return {
@@ -68,6 +69,7 @@ class Painting:
             "shadow": dark,
             "unresolved": self._unresolved,
             "rays": self._rays,
+            "shared": self._shared,
         }
 
     def steps(self) -> Generator[float, None, None]:
@@ -169,6 +171,7 @@ class Painting:
             return self._trace_rays(x, y)
         direction = self._table.directions(self._view.light(x, y), self._view.phi)
         left = np.flatnonzero(np.isnan(direction[:, 0]))
+        self._shared += len(x) - len(left)
         if len(left):
             direction[left] = self._trace_rays(x[left], y[left])
         return direction

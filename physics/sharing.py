@@ -23,6 +23,9 @@ from .sky_table import SkyTable, same_place
 from .sphere import celestial_coordinates, spherical_triad, unit_vectors
 from .warp_map import WarpMap, bake_steps
 
+# Rays that a table must stand for, for each that is traced all the same, to be worth asking.
+WORTHWHILE = 2.0
+
 # Difference between cameras that counts as none, in pixels.
 PIXEL_SHARE = 0.01
 
@@ -38,6 +41,8 @@ class MapBaker:
     def __init__(self) -> None:
         self._traced: WarpMap | None = None
         self._table: SkyTable | None = None
+        self._useless = False
+        """Whether the table has answered too few questions; it is kept, so as not to be made again."""
 
     def steps(self, parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
         """Bake one map as `bake_steps` does."""
@@ -45,8 +50,11 @@ class MapBaker:
             turned = turned_map(self._traced, parameters)
             if turned is not None:
                 return turned
-        traced = yield from bake_steps(parameters, self._table_for(parameters))
+        table = self._table_for(parameters)
+        traced = yield from bake_steps(parameters, table)
         self._traced = traced
+        if table is not None and traced.counts["shared"] < WORTHWHILE * traced.counts["rays"]:
+            self._useless = True
         return traced
 
     def _table_for(self, parameters: WarpMapParameters) -> SkyTable | None:
@@ -56,7 +64,8 @@ class MapBaker:
         if self._table is None or not self._table.serves(parameters):
             before = WarpMapParameters.from_metadata(self._traced.metadata["parameters"])
             self._table = SkyTable(parameters) if same_place(before, parameters) else None
-        return self._table
+            self._useless = False
+        return None if self._useless else self._table
 
 
 def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:
@@ -91,7 +100,8 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
         [0.0, 0.0, 1.0],
     ])
     rotation = np.array(parameters.hole_to_world) @ about_axis @ np.array(before.hole_to_world).T
-    metadata = {**earlier.metadata, "hash": parameters.hash, "parameters": parameters.to_metadata()}
+    counts = {**earlier.counts, "rays": 0, "shared": earlier.counts["rays"] + earlier.counts.get("shared", 0)}
+    metadata = {**earlier.metadata, "hash": parameters.hash, "counts": counts, "parameters": parameters.to_metadata()}
     return _rotated(earlier, rotation, metadata)
 
 

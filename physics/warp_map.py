@@ -35,7 +35,10 @@ class WarpMap:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``; and ``rays`` traced."""
+        """Pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``.
+
+        And ``rays`` that were traced for them, and ``shared``, rays that an earlier map or a table stood for.
+        """
         counts: dict[str, int] = self.metadata["counts"]
         return counts
 

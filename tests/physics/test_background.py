@@ -56,7 +56,12 @@ def test_leaving_the_block_waits_and_raises():
 
 def test_another_exception_on_its_way_comes_first_but_the_work_is_waited_for():
     done = []
-    with pytest.raises(KeyError), Background() as background:
-        background.start(lambda: done.append(1))
-        raise KeyError
+
+    def stop_half_way():
+        with Background() as background:
+            background.start(lambda: done.append(1))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        stop_half_way()
     assert done == [1]
