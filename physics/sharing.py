@@ -19,7 +19,7 @@ import numpy as np
 from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
-from .sky_table import SkyTable, same_place
+from .sky_table import SkyTable, same_place, sky_table_steps
 from .sphere import celestial_coordinates, spherical_triad, unit_vectors
 from .warp_map import WarpMap, bake_steps
 
@@ -50,22 +50,34 @@ class MapBaker:
             turned = turned_map(self._traced, parameters)
             if turned is not None:
                 return turned
-        table = self._table_for(parameters)
+        table = yield from self._table_for(parameters)
         traced = yield from bake_steps(parameters, table)
         self._traced = traced
         if table is not None and traced.counts["shared"] < WORTHWHILE * traced.counts["rays"]:
             self._useless = True
         return traced
 
-    def _table_for(self, parameters: WarpMapParameters) -> SkyTable | None:
+    def _table_for(self, parameters: WarpMapParameters) -> Generator[float, None, SkyTable | None]:
         if parameters.interpolation == 0.0 or self._traced is None:
             return None
         parameters.validate()
         if self._table is None or not self._table.serves(parameters):
             before = WarpMapParameters.from_metadata(self._traced.metadata["parameters"])
-            self._table = SkyTable(parameters) if same_place(before, parameters) else None
-            self._useless = False
+            self._table, self._useless = None, False
+            if same_place(before, parameters):
+                self._table = yield from _before(sky_table_steps(parameters))
         return None if self._useless else self._table
+
+
+def _before(steps: Generator[float, None, SkyTable]) -> Generator[float, None, SkyTable]:
+    """Do what comes before a map: its own progress has not begun."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            table: SkyTable = end.value
+            return table
+        yield 0.0
 
 
 def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:

@@ -16,6 +16,7 @@ a fast hole's shadow) the table gives no answer, and rays are traced as without 
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -50,41 +51,47 @@ PLACE_DIGITS = 11
 BISECTIONS = 53
 NEWTON_ROUNDS = 60
 
+Place = tuple[float, float, float, float, float, str]
+"""Spin, r, theta, and the settings of tracing: all that a table depends on."""
+
+
+def sky_table_steps(parameters: WarpMapParameters) -> Generator[float, None, SkyTable]:
+    """Make the table of a map's place, step by step: yields the fraction done after each block of rays, returns it.
+
+    The place is the map's observer's; the errors allowed to tracing and interpolation are the map's own.
+    """
+    place = spin, r, theta, error, tolerance, method = _place(parameters)
+    fido = Observer.fido(r, theta, 0.0)
+    aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False, dtype=np.float64))
+    edge = _edge_angles(spin, fido, aside, up)
+    closest = CLOSEST * float(edge.max())
+    first = math.log(closest) + closest
+    count = math.ceil((math.log(math.pi) + math.pi - first) / STEP) + len(ALONG)
+    delta = _distances(first + STEP * (np.arange(count) + ALONG[0]))
+    # Beyond the opposite point, where delta + edge passes pi, the same formula goes on down the other side.
+    looking = _looking(edge[:, None] + delta, aside[:, None], up[:, None]).reshape(-1, 3)
+    directions = np.empty((3, len(looking)))
+    for start in range(0, len(looking), BLOCK_SIZE):
+        block = slice(start, start + BLOCK_SIZE)
+        fate, found = trace_block(rays_from_triad(spin, fido, looking[block]), tolerance, method)
+        directions[:, block] = np.where(fate == Fate.SKY, found.T, np.nan)
+        yield min(block.stop, len(looking)) / len(looking)
+    values = directions.reshape(3, ANGLES, count)
+    served = _served(values, edge, delta, error)
+    return SkyTable(place, first, edge, np.where(served, values, np.nan))
+
 
 class SkyTable:
-    """The directions that light comes from, over the sky of the FIDO at one radius and polar angle.
+    """The directions that light comes from, over the sky of the FIDO at one radius and polar angle."""
 
-    Parameters
-    ----------
-    parameters : WarpMapParameters
-        The place is its observer's; the errors allowed to tracing and interpolation are its own.
-    """
-
-    def __init__(self, parameters: WarpMapParameters) -> None:
-        self._place = _place(parameters)
-        spin, r, theta, error, tolerance, method = self._place
-        fido = Observer.fido(r, theta, 0.0)
-        aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False, dtype=np.float64))
-        edge = _edge_angles(spin, fido, aside, up)
-        closest = CLOSEST * float(edge.max())
-        self._first = math.log(closest) + closest
-        count = math.ceil((math.log(math.pi) + math.pi - self._first) / STEP) + len(ALONG)
-        delta = _distances(self._first + STEP * (np.arange(count) + ALONG[0]))
-        # Beyond the opposite point, where delta + edge passes pi, the same formula goes on down the other side.
-        looking = _looking(edge[:, None] + delta, aside[:, None], up[:, None]).reshape(-1, 3)
-        directions = np.empty((3, len(looking)))
-        for start in range(0, len(looking), BLOCK_SIZE):
-            block = slice(start, start + BLOCK_SIZE)
-            fate, found = trace_block(rays_from_triad(spin, fido, looking[block]), tolerance, method)
-            directions[:, block] = np.where(fate == Fate.SKY, found.T, np.nan)
-        self.rays = len(looking)
-        """Rays that were traced for the table."""
-        values = directions.reshape(3, ANGLES, count)
-        good = _served(values, edge, delta, error)
+    def __init__(self, place: Place, first: float, edge: Array, values: Array) -> None:
+        """`first`: s of the first place served; `edge`, shape (angles,); `values`, shape (3, angles, count)."""
+        self._place = place
+        self._first = first
         around = np.arange(AROUND[0], ANGLES + AROUND[-1]) % ANGLES  # psi is a circle
         self._edge = edge[around]
-        self._values = [np.ascontiguousarray(np.where(good, each, np.nan)[around]).ravel() for each in values]
-        self._count = count
+        self._values = [np.ascontiguousarray(each[around]).ravel() for each in values]
+        self._count = values.shape[2]
 
     def serves(self, parameters: WarpMapParameters) -> bool:
         """Return whether the table was made for the place, and for the errors, of another map."""
@@ -127,7 +134,7 @@ def same_place(one: WarpMapParameters, other: WarpMapParameters) -> bool:
     return _place(one) == _place(other)
 
 
-def _place(parameters: WarpMapParameters) -> tuple[float, float, float, float, float, str]:
+def _place(parameters: WarpMapParameters) -> Place:
     """Return all that a table depends on; the place is rounded, so that a camera's azimuth does not matter."""
     observer = parameters.observer()
     return (

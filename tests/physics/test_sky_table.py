@@ -11,7 +11,7 @@ from shots import shot
 
 from physics import Fate, MapBaker, Observer, PanoramaCamera, PerspectiveCamera, bake
 from physics.rays import light_in_fido_frame, rays_from_triad
-from physics.sky_table import SkyTable
+from physics.sky_table import sky_table_steps
 from physics.tracer import drain, trace_block
 
 # Spin, radius and inclination of a camera, the motion it is given, and the share of the sky that must be served: less
@@ -30,7 +30,7 @@ PLACES = {
 def test_a_table_gives_the_directions_of_rays(name):
     spin, radius, inclination, motion, share = PLACES[name]
     parameters = shot(spin=spin, radius=radius, inclination=inclination, motion=motion)
-    table = SkyTable(parameters)
+    table = drain(sky_table_steps(parameters))
     observer = parameters.observer()
     generator = np.random.default_rng(5)
     looking = generator.standard_normal((4000, 3))
@@ -118,7 +118,7 @@ def test_a_table_that_answers_too_little_is_not_asked_again():
 
 
 def test_a_table_serves_every_azimuth_of_its_place_and_no_other():
-    table = SkyTable(BASE)
+    table = drain(sky_table_steps(BASE))
     assert table.serves(MOVES["turn and azimuth"][2])
     assert not table.serves(dataclasses.replace(BASE, spin=0.91))
     assert not table.serves(dataclasses.replace(BASE, interpolation=1e-6))
