@@ -2,6 +2,7 @@
 """Rays of light around a spinning (Kerr) black hole, and the warp maps made of them."""
 
 from .cameras import PanoramaCamera, PerspectiveCamera
+from .disk_tracer import DEFAULT_CROSSINGS, DiskResult, trace_disk
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
 from .sharing import turned_map
@@ -18,6 +19,7 @@ from .warp_map import WarpMap, bake, bake_steps
 from .warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
 
 __all__ = [
+    "DEFAULT_CROSSINGS",
     "DEFAULT_INTERPOLATION",
     "DEFAULT_METHOD",
     "DEFAULT_TOLERANCE",
@@ -26,6 +28,7 @@ __all__ = [
     "SUPERSAMPLING",
     "BlackHoleError",
     "Cancelled",
+    "DiskResult",
     "Fate",
     "ImageFileError",
     "Observer",
@@ -41,6 +44,7 @@ __all__ = [
     "looking_at_hole",
     "read_warp_map",
     "read_warp_map_metadata",
+    "trace_disk",
     "trace_rays",
     "turned_map",
     "unstable_orbit_warning",
