@@ -2,6 +2,9 @@
 """Rays of light around a spinning (Kerr) black hole, and the warp maps made of them."""
 
 from .cameras import PanoramaCamera, PerspectiveCamera
+from .disk import Disk
+from .disk_pass import DiskPass
+from .disk_pass_file import read_disk_pass, write_disk_pass
 from .disk_tracer import DEFAULT_CROSSINGS, DiskResult, trace_disk
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
@@ -28,6 +31,8 @@ __all__ = [
     "SUPERSAMPLING",
     "BlackHoleError",
     "Cancelled",
+    "Disk",
+    "DiskPass",
     "DiskResult",
     "Fate",
     "ImageFileError",
@@ -42,11 +47,13 @@ __all__ = [
     "bake",
     "bake_steps",
     "looking_at_hole",
+    "read_disk_pass",
     "read_warp_map",
     "read_warp_map_metadata",
     "trace_disk",
     "trace_rays",
     "turned_map",
     "unstable_orbit_warning",
+    "write_disk_pass",
     "write_warp_map",
 ]

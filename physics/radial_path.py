@@ -43,7 +43,7 @@ CHUNK = 2048
 # lacks. Next to the horizon, taking out the poles leaves rounding of some 1e-11, which is no lack of points.
 TAIL = 2
 TAIL_SHARE = 4.0
-ROUNDING = 1e-10
+ROUNDING = 1e-9
 
 # A ray has ended before a Mino time for certain if it is later by this many times the coefficients that tell the error.
 ENDED_MARGIN = 10.0
@@ -363,21 +363,19 @@ class _Series:
             found = Places.empty(*times.shape)
             found.duration[:], found.resolved[:] = self.duration, resolved
             order, ray = np.nonzero((times < self.duration) & resolved)
-            self._put(found, order, ray, times[order, ray], None)
+            if len(ray):
+                series, wanted = self.select(ray), times[order, ray]
+                z = self._invert(series, ray, wanted)
+                x, _ = series.place(z)
+                found.u[order, ray], found.u_slope[order, ray] = series.path.u(x), series.path.u_slope(x)
+                found.psi[order, ray] = series.psi(x, z)
             if beyond:
-                order, ray = np.nonzero((times >= self.duration) & resolved)
-                self._put(found, order, ray, times[order, ray], self.duration[ray])
+                late = (times >= self.duration) & resolved
+                slope = path.u_slope(path.end)
+                np.copyto(found.u, path.u(path.end) + slope * (times - self.duration), where=late)
+                np.copyto(found.u_slope, slope, where=late)
+                np.copyto(found.psi, self.psi(path.end, np.ones_like(path.end)), where=late)
         return found
-
-    def _put(self, found: Places, order: Index, ray: Index, times: Array, ends: Array | None) -> None:
-        if not len(ray):
-            return
-        series = self.select(ray)
-        z = self._invert(series, ray, times) if ends is None else np.ones(len(ray))
-        x, _ = series.place(z)
-        u, slope = series.path.u(x), series.path.u_slope(x)
-        found.u[order, ray] = u if ends is None else u + slope * (times - ends)
-        found.u_slope[order, ray], found.psi[order, ray] = slope, series.psi(x, z)
 
     def _invert(self, series: _Series, ray: Index, times: Array) -> Array:
         """Return z at the given Mino times."""
