@@ -37,6 +37,9 @@ PIXEL_ERROR = 0.03
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
 
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far.
+LOWEST_U, HIGHEST_U = -2.0, 4.0
+
 # Places along each side of a pixel that is divided.
 FINER = 4
 
@@ -50,8 +53,11 @@ MARKED_CIRCLES, MARKED_PLACES = 8, 256
 CHANNELS = 4
 U, COS, SIN, G = range(CHANNELS)
 
-# g is smooth only where there is an orbit, or a fall: beyond this many outer radii, and next to the horizon, it is held.
-FARTHEST_G, NEAREST_G = 3.0, 1.0001
+# g is smooth only where there is an orbit, or a fall: beyond so many outer and inner radii, and next to the horizon, it
+# is held.
+FARTHEST_G, INNERMOST_G, NEAREST_G = 3.0, 0.8, 1.0001
+# At a rim g changes along with the place by no more than this factor.
+LARGEST_CHANGE = 1.5
 
 
 class DiskPainting:
@@ -62,7 +68,8 @@ class DiskPainting:
         self._parameters = parameters
         self._disk = parameters.disk
         self._inner, self._outer = self._disk.radii(parameters.spin)
-        self._bounds_of_g = 1.0 / (FARTHEST_G * self._outer), 1.0 / (NEAREST_G * horizon_radius(parameters.spin))
+        nearest = max(NEAREST_G * horizon_radius(parameters.spin), INNERMOST_G * self._inner)
+        self._bounds_of_g = 1.0 / (FARTHEST_G * self._outer), 1.0 / nearest
         self._view = View(parameters)
         self._width, self._height = parameters.map_size
         self._planes = np.zeros((self._disk.crossings, 4, self._height, self._width), np.float32)
@@ -101,8 +108,9 @@ class DiskPainting:
             found, light = self._view.crossings(
                 x[block], y[block], self._disk.crossings, self._parameters.tolerance, self._parameters.method
             )
-            nowhere = np.where(found.fate == Fate.SHADOW, 2.0 / self._inner, -1.0 / self._outer)
-            values[:, U, block] = np.where(np.isnan(found.u), nowhere, found.u)
+            low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
+            nowhere = np.where(found.fate == Fate.SHADOW, high, low)
+            values[:, U, block] = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
             phi = np.nan_to_num(found.phi)
             values[:, COS, block], values[:, SIN, block] = np.cos(phi), np.sin(phi)
             g = light.g(self._parameters.spin, np.clip(found.u, *self._bounds_of_g), found.u_slope, self._disk.retrograde)
@@ -225,6 +233,7 @@ class DiskPainting:
         u, x, y = nearest_covered(here[U], right[U], below[U], self._inner, self._outer)
         moved = here + right * x + below * y
         moved[U] = u
+        moved[G] = np.clip(moved[G], here[G] / LARGEST_CHANGE, here[G] * LARGEST_CHANGE)
         self._write(order, place, moved, share[seen])
 
     def _write(
@@ -270,7 +279,7 @@ class DiskPainting:
                 self._put(order, columns[chosen], rows[chosen], smooth, *(
                     np.where(finer[:, None], 0.0, each) for each in (across, down)
                 ))
-            self._divide(order, columns[chosen][finer], rows[chosen][finer])
+            self._divide(order, columns[chosen][finer], rows[chosen][finer], np.moveaxis(here, 1, 0)[:, finer])
 
     def _needs_finer(self, u: Array, across: Array, down: Array) -> Mask:
         """Return which pixels have a rim in or beside them that is not nearly straight, shape (n, side, side)."""
@@ -287,10 +296,12 @@ class DiskPainting:
         needs: Mask = touched & ~whole & (bend > 8.0 * LARGEST_BEND * steep)
         return needs
 
-    def _divide(self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp]) -> None:
-        """Fill pixels from places on a finer grid inside them."""
+    def _divide(self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], centres: Array) -> None:
+        """Fill pixels from places on a finer grid inside them, and from their centres, shape (channels, n)."""
         group = max(1, BLOCK_SIZE // FINER**2)
         steps = (np.arange(FINER) + 0.5) / FINER
+        # Of places that are covered alike, the one next to the centre.
+        off_centre = 1e-3 * ((steps - 0.5) ** 2 + (steps[:, None] - 0.5) ** 2).ravel()
         for start in range(0, len(columns), group):
             column, row = columns[start : start + group], rows[start : start + group]
             x, y = column[:, None, None] + steps, row[:, None, None] + steps[:, None]
@@ -300,10 +311,12 @@ class DiskPainting:
             down, across = np.gradient(values[U], axis=(1, 2))
             shares = coverage(values[U], across, down, self._inner, self._outer).reshape(len(column), -1)
             share = shares.mean(axis=1)
-            # The place that is covered most stands for the pixel.
-            best = shares.argmax(axis=1)
+            # The centre stands for the pixel, or else the place that is covered most.
+            best = (shares - off_centre).argmax(axis=1)
             every = np.arange(len(column))
             seen = share > 0.0
-            flat = values.reshape(len(values), len(column), -1)[:, every, best][:, seen]
+            flat = values.reshape(len(values), len(column), -1)[:, every, best]
+            centre = centres[:, start : start + group]
+            flat = np.where((centre[U] > 1.0 / self._outer) & (centre[U] < 1.0 / self._inner), centre, flat)[:, seen]
             flat[U] = np.clip(flat[U], 1.0 / self._outer, 1.0 / self._inner)
             self._write(order, (column[seen], row[seen]), flat, share[seen])

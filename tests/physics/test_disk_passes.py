@@ -94,7 +94,7 @@ def test_passes_are_those_of_rays_traced_everywhere(name):
             assert np.median(radius) < 2e-4
             assert np.median(turn) < 2e-4
             assert np.median(shift) < 2e-4
-            assert np.quantile(radius, 0.95) < 0.03
+            assert np.quantile(radius, 0.95) < 0.01
 
 
 def test_interpolation_traces_few_rays_of_a_large_picture():
@@ -108,7 +108,8 @@ def test_tracing_every_pixel_gives_the_same():
     for one, other in zip(adaptive.disk_passes, every.disk_passes, strict=True):
         assert np.abs(one.coverage - other.coverage).mean() < 1e-3
         both = (one.coverage == 1.0) & (other.coverage == 1.0)
-        assert np.quantile(np.abs(one.radius / np.where(both, other.radius, 1.0) - 1.0)[both], 0.99) < 2e-3
+        if both.any():
+            assert np.quantile(np.abs(one.radius / np.where(both, other.radius, 1.0) - 1.0)[both], 0.99) < 2e-3
 
 
 def test_the_share_of_a_square_above_a_plane():
