@@ -300,8 +300,6 @@ class DiskPainting:
         """Fill pixels from places on a finer grid inside them, and from their centres, shape (channels, n)."""
         group = max(1, BLOCK_SIZE // FINER**2)
         steps = (np.arange(FINER) + 0.5) / FINER
-        # Of places that are covered alike, the one next to the centre.
-        off_centre = 1e-3 * ((steps - 0.5) ** 2 + (steps[:, None] - 0.5) ** 2).ravel()
         for start in range(0, len(columns), group):
             column, row = columns[start : start + group], rows[start : start + group]
             x, y = column[:, None, None] + steps, row[:, None, None] + steps[:, None]
@@ -311,12 +309,12 @@ class DiskPainting:
             down, across = np.gradient(values[U], axis=(1, 2))
             shares = coverage(values[U], across, down, self._inner, self._outer).reshape(len(column), -1)
             share = shares.mean(axis=1)
-            # The centre stands for the pixel, or else the place that is covered most.
-            best = (shares - off_centre).argmax(axis=1)
-            every = np.arange(len(column))
             seen = share > 0.0
-            flat = values.reshape(len(values), len(column), -1)[:, every, best]
-            centre = centres[:, start : start + group]
-            flat = np.where((centre[U] > 1.0 / self._outer) & (centre[U] < 1.0 / self._inner), centre, flat)[:, seen]
+            # A pixel that is partly covered, or by all of the disk at once, shows its mean: one place of it would
+            # twinkle from pixel to pixel along a thin ring.
+            values[U] = np.clip(values[U], 1.0 / self._outer, 1.0 / self._inner)
+            weights = shares[seen] / shares[seen].sum(axis=1, keepdims=True)
+            mean = (values.reshape(CHANNELS, len(column), -1)[:, seen] * weights).sum(axis=-1)
+            flat = np.where(share[seen] == 1.0, centres[:, start : start + group][:, seen], mean)
             flat[U] = np.clip(flat[U], 1.0 / self._outer, 1.0 / self._inner)
             self._write(order, (column[seen], row[seen]), flat, share[seen])
