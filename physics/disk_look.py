@@ -147,25 +147,33 @@ def density(look: DiskLook, disk: Disk, spin: float, radius: Array, noise: Array
 
 
 def shade(
-    look: DiskLook, disk: Disk, spin: float, radius: Array, phi: Array, g: Array, texture: Array, time: float
+    look: DiskLook,
+    disk: Disk,
+    spin: float,
+    place: tuple[Array, Array, Array, Array],
+    texture: Array,
+    time: float,
 ) -> tuple[Array, Array]:
     """Return the light, shape (..., 3), and the opacity, shape (...), of places on the disk.
 
-    The light is not yet multiplied by the opacity.
+    The light is not yet multiplied by the opacity, nor that by the coverage.
 
     Parameters
     ----------
     look, disk, spin
         What the disk is.
-    radius, phi, g : ndarray, shape (...)
-        As in `disk_pass.DiskPass`.
+    place : tuple of ndarray, shape (...)
+        Radius, phi, g and coverage as in `disk_pass.DiskPass`. A pixel that is partly covered holds a rim or, along a
+        thin ring, all of the disk at once: the less is covered, the more it shows the mean of streaks and clumps.
     texture : ndarray, shape (rows, columns, 2)
         Streaks and clumps, see `disk_texture.disk_texture`.
     time : float
         Units of M.
     """
+    radius, phi, g, coverage = place
     inner, outer = disk.radii(spin)
     noise = moving_texture(texture, radius, phi, time, spin, inner, outer, disk.retrograde)
+    noise = 0.5 + coverage[..., None] * (noise - 0.5)
     thick = density(look, disk, spin, radius, noise)
     light = emission(look, disk, spin, radius, g) * (thick ** (look.gain - 1.0))[..., None]
     return light, look.opacity * np.minimum(thick * OPACITY_REACH, 1.0)

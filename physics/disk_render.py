@@ -62,7 +62,7 @@ def disk_layers(
         radius, phi, g, coverage = (
             plane[seen].astype(np.float64) for plane in (one.radius, one.phi, one.g, one.coverage)
         )
-        colour, opacity = shade(look, disk, spin, radius, phi, g, texture, time)
+        colour, opacity = shade(look, disk, spin, (radius, phi, g, coverage), texture, time)
         alpha = opacity * coverage
         light[seen] += (through[seen] * alpha)[:, None] * colour
         through[seen] *= 1.0 - alpha
