@@ -10,6 +10,9 @@ from .rays import Array
 # A slope along one axis of less than this share of the other's counts as that.
 LEAST_SLOPE = 1e-4
 
+# A slope of less than this is none.
+FLAT = 1e-15
+
 # Coverage of less than this, or lacking less than this, is none or all.
 LEAST_COVERAGE = 1e-4
 
@@ -20,7 +23,7 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
     The integral of max(z, 0) twice over: exact for a plane.
     """
     one, other = np.abs(slope_x), np.abs(slope_y)
-    long = np.maximum(np.maximum(one, other), np.finfo(float).tiny)
+    long = np.maximum(np.maximum(one, other), FLAT)
     short = np.maximum(np.minimum(one, other), LEAST_SLOPE * long)
     short = short / long
     height = np.clip(height / long, -1.0, 1.0)  # beyond half of 1 + short nothing changes
@@ -47,5 +50,5 @@ def coverage(u: Array, slope_x: Array, slope_y: Array, inner: float, outer: floa
 def nearest_covered(u: Array, slope_x: Array, slope_y: Array, inner: float, outer: float) -> tuple[Array, Array, Array]:
     """Return u within the annulus, and how many pixels right and down of the centre it is met, at most half of one."""
     inside = np.clip(u, 1.0 / outer, 1.0 / inner)
-    away = (inside - u) / np.maximum(slope_x * slope_x + slope_y * slope_y, np.finfo(float).tiny)
+    away = (inside - u) / np.maximum(slope_x * slope_x + slope_y * slope_y, FLAT * FLAT)
     return inside, np.clip(away * slope_x, -0.5, 0.5), np.clip(away * slope_y, -0.5, 0.5)

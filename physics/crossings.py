@@ -72,18 +72,24 @@ class LightAtDisk:
         return factor * self.camera_energy
 
 
-def cross_plane(rays: Rays, count: int, tolerance: float, beyond: bool = False) -> Crossings:
+def cross_plane(
+    rays: Rays, count: int, tolerance: float, beyond: bool = False, wanted: NDArray[np.bool_] | None = None
+) -> Crossings:
     """Return the first `count` crossings of rays of positive energy, without steps: `radial_path` and `polar`.
+
+    Where `wanted`, shape (count, n), is given, the others are left NaN.
 
     Rays whose answer does not converge to `tolerance` radians have the fate UNRESOLVED and no crossings.
     """
     barrier = find_barrier(rays)
     motion = PolarMotion.of(rays)
     times, azimuth = motion.plane_crossings(count, tolerance)
+    if wanted is not None:
+        times[~wanted] = np.nan
     found = places_of_rays(rays, barrier, times, tolerance, beyond)
     reached = np.isfinite(found.u)
     # A ray that never crosses is resolved as it is.
-    resolved = found.resolved | np.isnan(times[0])
+    resolved = found.resolved | np.isnan(times).all(axis=0)
     fate = np.where(comes_from_sky(rays, barrier), Fate.SKY, Fate.SHADOW)
     return Crossings(
         found.u,

@@ -37,8 +37,10 @@ PIXEL_ERROR = 0.03
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
 
-# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far.
-LOWEST_U, HIGHEST_U = -2.0, 4.0
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far: for samples that
+# must stay smooth, and for differences between pixels.
+LOWEST_U, HIGHEST_U = -30.0, 20.0
+LOWEST_STEP, HIGHEST_STEP = -2.0, 4.0
 
 # Places along each side of a pixel that is divided.
 FINER = 4
@@ -96,8 +98,10 @@ class DiskPainting:
 
     # --- samples -----------------------------------------------------------------------------------
 
-    def _sample(self, x: Array, y: Array) -> tuple[Array, Mask]:
+    def _sample(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
         """Return the channels, shape (crossings, channels, n), and which rays were given up, (n,).
+
+        Only what is `wanted`, shape (crossings, n), means anything.
 
         u is finite everywhere: rays that never cross count as far beyond their end.
         """
@@ -106,15 +110,21 @@ class DiskPainting:
         for start in range(0, len(x), BLOCK_SIZE):
             block = slice(start, start + BLOCK_SIZE)
             found, light = self._view.crossings(
-                x[block], y[block], self._disk.crossings, self._parameters.tolerance, self._parameters.method
+                x[block],
+                y[block],
+                self._disk.crossings,
+                self._parameters.tolerance,
+                self._parameters.method,
+                wanted[:, block],
             )
             low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
             nowhere = np.where(found.fate == Fate.SHADOW, high, low)
             values[:, U, block] = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
-            phi = np.nan_to_num(found.phi)
-            values[:, COS, block], values[:, SIN, block] = np.cos(phi), np.sin(phi)
-            g = light.g(self._parameters.spin, np.clip(found.u, *self._bounds_of_g), found.u_slope, self._disk.retrograde)
-            values[:, G, block] = np.nan_to_num(g)
+            for order in np.flatnonzero(wanted[:, block].any(axis=1)):
+                phi, u = np.nan_to_num(found.phi[order]), np.clip(found.u[order], *self._bounds_of_g)
+                g = light.g(self._parameters.spin, u, found.u_slope[order], self._disk.retrograde)
+                values[order, COS, block], values[order, SIN, block] = np.cos(phi), np.sin(phi)
+                values[order, G, block] = np.nan_to_num(g)
             lost[block] = found.fate == Fate.UNRESOLVED
         self._rays += len(x)
         return values, lost
@@ -164,7 +174,7 @@ class DiskPainting:
     def _judge(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
         """Sample tiles, fill what they determine and strike it from `wanted`, whose rows `part` they are."""
         x, y = sample_places(tiles)
-        values, lost = self._sample(x, y)
+        values, lost = self._sample(x, y, np.repeat(wanted[part].T, POINTS**2, axis=1))
         values = values.reshape(*values.shape[:2], len(tiles), POINTS, POINTS)
         broken = lost.reshape(len(tiles), -1).any(axis=1)
         allowed = PLACE_ERROR * self._parameters.interpolation
@@ -195,7 +205,6 @@ class DiskPainting:
         base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side))
         coefficients = coefficients.astype(np.float32)
         values = base @ coefficients @ base.T
-        columns, rows = (np.broadcast_to(each, values[:, U].shape) for each in tiles.pixels())
         u = values[:, U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is a small part of a tile's.
@@ -205,8 +214,26 @@ class DiskPainting:
             self._write_whole(tiles.select(whole), values[whole], order)
         rim = np.flatnonzero(~whole)
         if len(rim):
-            across, down = base @ coefficients[rim] @ slope.T, slope @ coefficients[rim] @ base.T
-            self._put(order, columns[rim], rows[rim], values[rim], across, down)
+            self._put_rim(order, tiles.select(rim), coefficients[rim], values[rim])
+
+    def _put_rim(self, order: int, tiles: Tiles, coefficients: Array, values: Array) -> None:
+        """Write tiles with a rim in them from Chebyshev coefficients and the channels, (n, channels, side, side)."""
+        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side))
+        u, across, down = values[:, U], base @ coefficients[:, U] @ slope.T, slope @ coefficients[:, U] @ base.T
+        columns, rows = (np.broadcast_to(each, u.shape) for each in tiles.pixels())
+        share = coverage(u, across, down, self._inner, self._outer)
+        share[(columns >= self._width) | (rows >= self._height)] = 0.0
+        whole, partly = share == 1.0, (share > 0.0) & (share < 1.0)
+        self._write(order, (columns[whole], rows[whole]), np.moveaxis(values, 1, 0)[:, whole], share[whole])
+        tile, row, column = np.nonzero(partly)
+        if not len(tile):
+            return
+        inside, x, y = nearest_covered(u[partly], across[partly], down[partly], self._inner, self._outer)
+        along = base[column] + slope[column] * x[:, None]
+        upright = base[row] + slope[row] * y[:, None]
+        met = np.einsum("ni,ncij,nj->cn", upright, coefficients[tile], along, optimize=True)
+        met[U] = inside
+        self._write(order, (columns[partly], rows[partly]), met, share[partly])
 
     def _write_whole(self, tiles: Tiles, values: Array, order: int) -> None:
         """Write tiles that the disk covers wholly, from channels of shape (n, channels, side, side)."""
@@ -261,7 +288,8 @@ class DiskPainting:
         columns, rows = tiles.pixels()
         shape = (len(tiles), tiles.side, tiles.side)
         columns, rows = np.broadcast_to(columns, shape), np.broadcast_to(rows, shape)
-        values, lost = self._sample(columns.ravel() + 0.5, rows.ravel() + 0.5)
+        every = np.repeat(wanted.T, tiles.side**2, axis=1)
+        values, lost = self._sample(columns.ravel() + 0.5, rows.ravel() + 0.5, every)
         values = values.reshape(*values.shape[:2], *shape)
         inside = (columns < self._width) & (rows < self._height)
         given_up = lost.reshape(shape) & inside
@@ -271,6 +299,7 @@ class DiskPainting:
             if not len(chosen):
                 continue
             here = np.moveaxis(traced[:, chosen], 0, 1)
+            here[:, U] = np.clip(here[:, U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
             down, across = np.gradient(here, axis=(2, 3))
             finer = self._needs_finer(here[:, U], across[:, U], down[:, U])
             finer &= inside[chosen]
@@ -304,8 +333,11 @@ class DiskPainting:
             column, row = columns[start : start + group], rows[start : start + group]
             x, y = column[:, None, None] + steps, row[:, None, None] + steps[:, None]
             x, y = np.broadcast_arrays(x, y)
-            values, _ = self._sample(x.ravel(), y.ravel())
+            alone = np.zeros((self._disk.crossings, x.size), dtype=bool)
+            alone[order] = True
+            values, _ = self._sample(x.ravel(), y.ravel(), alone)
             values = values[order].reshape(-1, *x.shape)
+            values[U] = np.clip(values[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
             down, across = np.gradient(values[U], axis=(1, 2))
             shares = coverage(values[U], across, down, self._inner, self._outer).reshape(len(column), -1)
             share = shares.mean(axis=1)

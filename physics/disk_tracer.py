@@ -29,19 +29,23 @@ from .tracer import (
 DEFAULT_CROSSINGS = 3
 MOST_CROSSINGS = 8
 
-Crosser = Callable[[Rays, int, float, int, bool], Crossings]
+Crosser = Callable[[Rays, int, float, int, bool, NDArray[np.bool_] | None], Crossings]
 
 
-def _without_steps(rays: Rays, count: int, tolerance: float, max_steps: int, beyond: bool) -> Crossings:
+def _without_steps(
+    rays: Rays, count: int, tolerance: float, max_steps: int, beyond: bool, wanted: NDArray[np.bool_] | None
+) -> Crossings:
     """Return crossings in closed form, and by steps what few do not converge."""
-    found = cross_plane(rays, count, tolerance, beyond)
+    found = cross_plane(rays, count, tolerance, beyond, wanted)
     left = np.flatnonzero(found.fate == Fate.UNRESOLVED)
     if len(left):
         found.put(left, step_to_plane(rays.select(left), count, tolerance, max_steps))
     return found
 
 
-def _by_steps(rays: Rays, count: int, tolerance: float, max_steps: int, beyond: bool) -> Crossings:
+def _by_steps(
+    rays: Rays, count: int, tolerance: float, max_steps: int, beyond: bool, wanted: NDArray[np.bool_] | None
+) -> Crossings:
     return step_to_plane(rays, count, tolerance, max_steps)
 
 
@@ -172,12 +176,18 @@ def disk_crossings(
     method: str,
     max_steps: int = DEFAULT_MAX_STEPS,
     beyond: bool = False,
+    wanted: NDArray[np.bool_] | None = None,
 ) -> tuple[Crossings, LightAtDisk]:
-    """Return the crossings of rays along `directions`, shape (n, 3), and what their redshifts depend on."""
+    """Return the crossings of rays along `directions`, shape (n, 3), and what their redshifts depend on.
+
+    Where `wanted`, shape (count, n), is given, the other crossings may be left out.
+    """
     found = Crossings.empty(count, len(directions))
     light = LightAtDisk(*(np.empty(len(directions)) for _ in range(3)))
     for index, rays, sign in split_by_energy(spin, observer, directions):
-        part = DISK_METHODS[method](rays, count, tolerance, max_steps, beyond)
+        part = DISK_METHODS[method](
+            rays, count, tolerance, max_steps, beyond, None if wanted is None else wanted[:, index]
+        )
         if sign < 0.0:
             part.fate[part.fate == Fate.SKY] = Fate.SHADOW
         found.put(index, part)

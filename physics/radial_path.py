@@ -47,10 +47,12 @@ ROUNDING = 1e-9
 
 # A ray has ended before a Mino time for certain if it is later by this many times the coefficients that tell the error.
 ENDED_MARGIN = 10.0
-ENDED_ERROR = 1e-2
+ENDED_ERROR = 1e-3
 
-# Newton's rounds from the straight line between two points. The first is off by 1e-2 of the interval at the most.
-NEWTON_ROUNDS = 3
+# Newton's rounds from the straight line between two points, and the share of the tolerance's square root that the last
+# of them may change by: its square is left.
+NEWTON_ROUNDS = 6
+LAST_CHANGE = 0.03
 
 # The horizon itself, where psi is infinite, is not reached: paths end at this multiple of its radius.
 HORIZON_MARGIN = 1.0 + 1e-9
@@ -358,14 +360,15 @@ class _Series:
                 error += self.psi_tail
             resolved = error <= max(TAIL_SHARE * tolerance, ROUNDING)
             # Rays that have ended before anything is asked of them need be known no better than that.
-            resolved |= (times[0] > self.duration + ENDED_MARGIN * self.time_tail) & (error < ENDED_ERROR)
+            first = np.fmin.reduce(times, axis=0)
+            resolved |= (first > self.duration + ENDED_MARGIN * self.time_tail) & (error < ENDED_ERROR)
             resolved &= np.isfinite(self.duration)
             found = Places.empty(*times.shape)
             found.duration[:], found.resolved[:] = self.duration, resolved
             order, ray = np.nonzero((times < self.duration) & resolved)
             if len(ray):
                 series, wanted = self.select(ray), times[order, ray]
-                z = self._invert(series, ray, wanted)
+                z = self._invert(series, ray, wanted, LAST_CHANGE * tolerance**0.5)
                 x, _ = series.place(z)
                 found.u[order, ray], found.u_slope[order, ray] = series.path.u(x), series.path.u_slope(x)
                 found.psi[order, ray] = series.psi(x, z)
@@ -377,7 +380,7 @@ class _Series:
                 np.copyto(found.psi, self.psi(path.end, np.ones_like(path.end)), where=late)
         return found
 
-    def _invert(self, series: _Series, ray: Index, times: Array) -> Array:
+    def _invert(self, series: _Series, ray: Index, times: Array, last_change: float) -> Array:
         """Return z at the given Mino times."""
         known = np.vstack([np.zeros(len(self.half)), self.time_at_points, self.duration])[:, ray]
         after = np.clip((known <= times).sum(axis=0), 1, len(known) - 1)
@@ -389,6 +392,8 @@ class _Series:
             x, step = series.place(z)
             change = (_clenshaw(series.time_series, z) - times) * series.path.speed(x) / step
             z = np.clip(z - change, -1.0, 1.0)
+            if not (np.abs(change) > last_change).any():
+                break
         where: Array = z
         return where
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .crossings import Crossings, LightAtDisk
 from .disk_tracer import disk_crossings
@@ -60,15 +61,23 @@ class View:
         return constant + along
 
     def crossings(
-        self, x: Array, y: Array, count: int, tolerance: float, method: str
+        self,
+        x: Array,
+        y: Array,
+        count: int,
+        tolerance: float,
+        method: str,
+        wanted: NDArray[np.bool_] | None = None,
     ) -> tuple[Crossings, LightAtDisk]:
-        """Return the rays' crossings of the equatorial plane at map pixel coordinates x, y, shape (n,), and their light.
+        """Return the crossings of the equatorial plane at map pixel coordinates x, y, shape (n,), and the rays' light.
 
-        They go on smoothly beyond the rays' ends, see `crossings.Crossings`.
+        They go on smoothly beyond the rays' ends, see `crossings.Crossings`; for `wanted` see `disk_crossings`.
         """
         seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
         looking = seen @ self._camera_to_triad @ camera_triad(self._observer).T
-        return disk_crossings(self._spin, self._observer, looking, count, tolerance, method, beyond=True)
+        return disk_crossings(
+            self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted
+        )
 
     def places_in_plane(self, radii: Array, azimuths: Array) -> tuple[Array, Array]:
         """Return map pixel coordinates where places in the equatorial plane would be seen in flat space, shape (n,)."""
