@@ -22,7 +22,7 @@ from .metric import horizon_radius
 from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
-from .tiles import POINTS, TAIL, TAIL_SHARE, TILE_SIDES, Tiles, at_pixels, coefficients_of, sample_places, tiles_of
+from .tiles import POINTS, TAIL, TAIL_SHARE, TILE_SIDES, Tiles, at_pixels, chebyshev_places, coefficients_of, sample_places, tiles_of
 from .tracer import BLOCK_SIZE, Fate
 from .view import View
 
@@ -51,6 +51,12 @@ LARGEST_BEND = 0.03
 # Circles and places on each that mark where the disk is, for tiles whose samples may miss it.
 MARKED_CIRCLES, MARKED_PLACES = 8, 256
 
+# The part of the differences around a sample that it must be off the disk by to count as far from it.
+FAR_SHARE = 0.3
+
+# Pixels below which the spread of these places, across where it is least, makes a slim disk.
+SLIM = 8.0
+
 # Channels of what is interpolated.
 CHANNELS = 4
 U, COS, SIN, G = range(CHANNELS)
@@ -75,6 +81,8 @@ class DiskPainting:
         self._view = View(parameters)
         self._width, self._height = parameters.map_size
         self._planes = np.zeros((self._disk.crossings, 4, self._height, self._width), np.float32)
+        # Pixels that samples of their tile say are far from the disk, by crossing.
+        self._far = np.zeros((self._disk.crossings, self._height, self._width), dtype=bool)
         self._unresolved = np.zeros((self._height, self._width), dtype=bool)
         self._rays = 0
 
@@ -101,7 +109,7 @@ class DiskPainting:
     def _sample(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
         """Return the channels, shape (crossings, channels, n), and which rays were given up, (n,).
 
-        Only what is `wanted`, shape (crossings, n), means anything.
+        Only what is `wanted`, shape (crossings, n), means anything; the others' u is NaN.
 
         u is finite everywhere: rays that never cross count as far beyond their end.
         """
@@ -119,7 +127,8 @@ class DiskPainting:
             )
             low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
             nowhere = np.where(found.fate == Fate.SHADOW, high, low)
-            values[:, U, block] = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
+            u = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
+            values[:, U, block] = np.where(wanted[:, block], u, np.nan)
             for order in np.flatnonzero(wanted[:, block].any(axis=1)):
                 phi, u = np.nan_to_num(found.phi[order]), np.clip(found.u[order], *self._bounds_of_g)
                 g = light.g(self._parameters.spin, u, found.u_slope[order], self._disk.retrograde)
@@ -154,10 +163,17 @@ class DiskPainting:
         yield from self._trace(waiting, wanted, done)
 
     def _marked_places(self) -> tuple[Array, Array]:
-        """Return pixel coordinates on the disk as flat space would show it, and of the hole's centre."""
+        """Return pixel coordinates of the hole's centre and, if it is slim, on the disk as flat space would show it.
+
+        Samples may miss a disk that is seen from the edge, or from afar; a broad one they cannot.
+        """
         radii = np.linspace(self._inner, self._outer, MARKED_CIRCLES)
         turn = np.arange(MARKED_PLACES) * (2.0 * math.pi / MARKED_PLACES)
         x, y = self._view.places_in_plane(np.repeat(radii, len(turn)), np.tile(turn, len(radii)))
+        known = np.isfinite(x) & np.isfinite(y)
+        x, y = x[known], y[known]
+        if len(x) > 1 and math.sqrt(max(np.linalg.eigvalsh(np.cov(x, y))[0], 0.0)) > SLIM:
+            x, y = x[:0], y[:0]
         centre = self._view.centre()
         if centre is not None:
             x, y = np.append(x, centre[0]), np.append(y, centre[1])
@@ -198,6 +214,13 @@ class DiskPainting:
             if good.any():
                 self._fill(tiles.select(chosen[good]), coefficients[good], order)
             wanted[part[chosen[good | empty]], order] = False
+            if tiles.side == TILE_SIDES[-1]:
+                left = chosen[~(good | empty)]
+                near = _near_annulus(sampled[U, left], 1.0 / self._outer, 1.0 / self._inner)
+                near[marked[left]] = True
+                for i, tile in enumerate(left):
+                    place = self._far[order, tiles.row[tile] :, tiles.column[tile] :][: tiles.side, : tiles.side]
+                    place[:] = ~near[i, : place.shape[0], : place.shape[1]]
 
     def _fill(self, tiles: Tiles, coefficients: Array, order: int) -> None:
         """Fill whole tiles from Chebyshev coefficients, shape (n, channels, POINTS, POINTS)."""
@@ -288,11 +311,15 @@ class DiskPainting:
         columns, rows = tiles.pixels()
         shape = (len(tiles), tiles.side, tiles.side)
         columns, rows = np.broadcast_to(columns, shape), np.broadcast_to(rows, shape)
-        every = np.repeat(wanted.T, tiles.side**2, axis=1)
-        values, lost = self._sample(columns.ravel() + 0.5, rows.ravel() + 0.5, every)
-        values = values.reshape(*values.shape[:2], *shape)
         inside = (columns < self._width) & (rows < self._height)
-        given_up = lost.reshape(shape) & inside
+        looked = (np.minimum(rows, self._height - 1), np.minimum(columns, self._width - 1))
+        every = wanted.T[:, :, None, None] & ~self._far[:, *looked]
+        traced = every.any(axis=0)
+        values = np.full((self._disk.crossings, CHANNELS, *shape), np.nan)
+        values[:, :, traced], lost = self._sample(columns[traced] + 0.5, rows[traced] + 0.5, every[:, traced])
+        given_up = np.zeros(shape, dtype=bool)
+        given_up[traced] = lost
+        given_up &= inside
         self._unresolved[rows[given_up], columns[given_up]] = True
         for order, traced in enumerate(values):
             chosen = np.flatnonzero(wanted[:, order])
@@ -350,3 +377,23 @@ class DiskPainting:
             flat = np.where(share[seen] == 1.0, centres[:, start : start + group][:, seen], mean)
             flat[U] = np.clip(flat[U], 1.0 / self._outer, 1.0 / self._inner)
             self._write(order, (column[seen], row[seen]), flat, share[seen])
+
+
+def _near_annulus(u: Array, low: float, high: float) -> Mask:
+    """Return which pixels of the smallest tiles may see u between `low` and `high`, shape (n, side, side).
+
+    `u` is sampled at the tiles' Chebyshev points, shape (n, POINTS, POINTS). A point is far if it and all around it
+    are off to the same side, and by a good part of what they differ by; a pixel, if the four points around it are.
+    """
+    off = np.maximum(low - u, u - high)
+    side = np.where(u > high, 1.0, -1.0)
+    padded = [np.pad(each, ((0, 0), (1, 1), (1, 1)), mode="edge") for each in (off, side, u)]
+    around = [np.lib.stride_tricks.sliding_window_view(each, (3, 3), axis=(1, 2)) for each in padded]
+    spread = around[2].max(axis=(3, 4)) - around[2].min(axis=(3, 4))
+    far = (around[0].min(axis=(3, 4)) > FAR_SHARE * spread) & (np.abs(around[1].sum(axis=(3, 4))) == 9.0)
+    tile_side = TILE_SIDES[-1]
+    before = np.searchsorted(chebyshev_places(), (np.arange(tile_side) + 0.5) / tile_side) - 1
+    first, second = np.clip(before, 0, POINTS - 1), np.clip(before + 1, 0, POINTS - 1)
+    by_row = far[:, first] & far[:, second]
+    near: Mask = ~(by_row[:, :, first] & by_row[:, :, second])
+    return near

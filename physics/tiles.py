@@ -104,6 +104,11 @@ def sample_places(tiles: Tiles) -> tuple[Array, Array]:
     return x.ravel(), y.ravel()
 
 
+def chebyshev_places() -> Array:
+    """Return where along a tile's side its points are, 0 to 1, shape (POINTS,)."""
+    return _PLACES
+
+
 def coefficients_of(values: Array) -> Array:
     """Return the Chebyshev coefficients of samples by row and column, shape (..., POINTS, POINTS)."""
     coefficients: Array = _COEFFICIENTS @ values @ _COEFFICIENTS.T
