@@ -4,14 +4,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .rays import Array
+from .tiles import POINTS, TILE_SIDES, chebyshev_places
 
 # A slope along one axis of less than this share of the other's counts as that.
 LEAST_SLOPE = 1e-4
 
 # A slope of less than this is none.
 FLAT = 1e-15
+
+# The part of the differences around a sample that it must be off the disk by to count as far from it.
+FAR_SHARE = 0.3
 
 # Coverage of less than this, or lacking less than this, is none or all.
 LEAST_COVERAGE = 1e-4
@@ -30,7 +35,8 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
 
     def twice(z: Array) -> Array:
         positive = np.maximum(z, 0.0)
-        return 0.5 * positive * positive
+        half_square: Array = 0.5 * positive * positive
+        return half_square
 
     far, near = 0.5 * (1.0 + short), 0.5 * (1.0 - short)
     share = (twice(height + far) - twice(height + near) - twice(height - near) + twice(height - far)) / short
@@ -52,3 +58,33 @@ def nearest_covered(u: Array, slope_x: Array, slope_y: Array, inner: float, oute
     inside = np.clip(u, 1.0 / outer, 1.0 / inner)
     away = (inside - u) / np.maximum(slope_x * slope_x + slope_y * slope_y, FLAT * FLAT)
     return inside, np.clip(away * slope_x, -0.5, 0.5), np.clip(away * slope_y, -0.5, 0.5)
+
+
+def near_annulus(u: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which pixels of the smallest tiles may see u between `low` and `high`, shape (n, side, side).
+
+    `u` is sampled at the tiles' Chebyshev points, shape (n, POINTS, POINTS). A point is far if it and all around it
+    are off to the same side, and by a good part of what they differ by; a pixel, if the four points around it are.
+    """
+    off = np.maximum(low - u, u - high)
+    side = np.where(u > high, 1.0, -1.0)
+    highest = [_around(each, np.maximum) for each in (u, side)]
+    lowest = [_around(each, np.minimum) for each in (u, side, off)]
+    far = (lowest[2] > FAR_SHARE * (highest[0] - lowest[0])) & (highest[1] == lowest[1])
+    tile_side = TILE_SIDES[-1]
+    before = np.searchsorted(chebyshev_places(), (np.arange(tile_side) + 0.5) / tile_side) - 1
+    first, second = np.clip(before, 0, POINTS - 1), np.clip(before + 1, 0, POINTS - 1)
+    by_row = far[:, first] & far[:, second]
+    near: NDArray[np.bool_] = ~(by_row[:, :, first] & by_row[:, :, second])
+    return near
+
+
+def _around(values: Array, extreme: np.ufunc) -> Array:
+    """Return the largest or smallest of each value and its eight neighbours, shape (n, rows, columns)."""
+    found = values.copy()
+    for axis in (1, 2):
+        here = found.copy()
+        ahead, behind = (slice(None),) * axis + (slice(1, None),), (slice(None),) * axis + (slice(None, -1),)
+        extreme(found[behind], here[ahead], out=found[behind])
+        extreme(found[ahead], here[behind], out=found[ahead])
+    return found

@@ -51,10 +51,11 @@ class Disk:
         closest = CLOSEST_TO_HORIZON * horizon_radius(spin)
         if not (math.isfinite(inner) and inner >= closest):
             raise BlackHoleError(
-                f"The disk's inner radius is {inner:.4g} M; the horizon of this hole allows {closest:.4g} M at the least."
+                f"The disk's inner radius is {inner:.4g} M; the horizon of this hole allows {closest:.4g} M at the "
+                f"least."
             )
         if not inner < outer <= LARGEST_OUTER_RADIUS:
             raise BlackHoleError(
-                f"The disk's outer radius is {outer:.4g} M; it must be larger than the inner one, {inner:.4g} M, and at "
-                f"most {LARGEST_OUTER_RADIUS:g} M."
+                f"The disk's outer radius is {outer:.4g} M; it must be larger than the inner one, {inner:.4g} M, and "
+                f"at most {LARGEST_OUTER_RADIUS:g} M."
             )

@@ -22,11 +22,17 @@ from .warp_map import WarpMap
 def add_bake_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which disk is baked along."""
     parser.add_argument("--disk", action="store_true", help="bake a disk's passes too, beside the map")
-    unset = {"default": argparse.SUPPRESS}
-    parser.add_argument("--disk-crossings", type=int, **unset, help=f"images of the disk to follow (default: {DEFAULT_CROSSINGS})")
-    parser.add_argument("--disk-inner", type=float, **unset, help="inner radius, in M (default: the innermost stable orbit)")
-    parser.add_argument("--disk-outer", type=float, **unset, help=f"outer radius, in M (default: {DEFAULT_OUTER_RADIUS:g})")
-    parser.add_argument("--disk-retrograde", action="store_true", **unset, help="it turns against the hole")
+    unset = argparse.SUPPRESS
+    parser.add_argument(
+        "--disk-crossings", type=int, default=unset, help=f"images of the disk to follow (default: {DEFAULT_CROSSINGS})"
+    )
+    parser.add_argument(
+        "--disk-inner", type=float, default=unset, help="inner radius, in M (default: the innermost stable orbit)"
+    )
+    parser.add_argument(
+        "--disk-outer", type=float, default=unset, help=f"outer radius, in M (default: {DEFAULT_OUTER_RADIUS:g})"
+    )
+    parser.add_argument("--disk-retrograde", action="store_true", default=unset, help="it turns against the hole")
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:

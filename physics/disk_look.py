@@ -69,7 +69,8 @@ class DiskLook:
             raise BlackHoleError(f"The power of g in the brightness is {self.beaming}; choose 4 or 3.")
         if not COLDEST <= self.temperature <= HOTTEST:
             raise BlackHoleError(
-                f"The disk's temperature is {self.temperature:g} K; give it a value between {COLDEST:g} and {HOTTEST:g} K."
+                f"The disk's temperature is {self.temperature:g} K; give it a value between {COLDEST:g} and "
+                f"{HOTTEST:g} K."
             )
         for name in ("doppler_colour", "doppler_brightness", "opacity", "streaks", "clumps", "colour_variation"):
             value = getattr(self, name)

@@ -16,13 +16,23 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from .annulus import coverage, nearest_covered
+from .annulus import coverage, near_annulus, nearest_covered
 from .disk_pass import DiskPass
 from .metric import horizon_radius
 from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
-from .tiles import POINTS, TAIL, TAIL_SHARE, TILE_SIDES, Tiles, at_pixels, chebyshev_places, coefficients_of, sample_places, tiles_of
+from .tiles import (
+    POINTS,
+    TAIL,
+    TAIL_SHARE,
+    TILE_SIDES,
+    Tiles,
+    at_pixels,
+    coefficients_of,
+    sample_places,
+    tiles_of,
+)
 from .tracer import BLOCK_SIZE, Fate
 from .view import View
 
@@ -37,8 +47,8 @@ PIXEL_ERROR = 0.03
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
 
-# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far: for samples that
-# must stay smooth, and for differences between pixels.
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far: for samples
+# that must stay smooth, and for differences between pixels.
 LOWEST_U, HIGHEST_U = -30.0, 20.0
 LOWEST_STEP, HIGHEST_STEP = -2.0, 4.0
 
@@ -50,9 +60,6 @@ LARGEST_BEND = 0.03
 
 # Circles and places on each that mark where the disk is, for tiles whose samples may miss it.
 MARKED_CIRCLES, MARKED_PLACES = 8, 256
-
-# The part of the differences around a sample that it must be off the disk by to count as far from it.
-FAR_SHARE = 0.3
 
 # Pixels below which the spread of these places, across where it is least, makes a slim disk.
 SLIM = 8.0
@@ -93,7 +100,8 @@ class DiskPainting:
     def passes(self, metadata: dict[str, object]) -> tuple[DiskPass, ...]:
         """Return the passes in order."""
         return tuple(
-            DiskPass(*planes, {**metadata, "crossing": order}) for order, planes in enumerate(self._planes, start=1)
+            DiskPass(planes[0], planes[1], planes[2], planes[3], {**metadata, "crossing": order})
+            for order, planes in enumerate(self._planes, start=1)
         )
 
     def steps(self) -> Generator[float, None, None]:
@@ -216,7 +224,7 @@ class DiskPainting:
             wanted[part[chosen[good | empty]], order] = False
             if tiles.side == TILE_SIDES[-1]:
                 left = chosen[~(good | empty)]
-                near = _near_annulus(sampled[U, left], 1.0 / self._outer, 1.0 / self._inner)
+                near = near_annulus(sampled[U, left], 1.0 / self._outer, 1.0 / self._inner)
                 near[marked[left]] = True
                 for i, tile in enumerate(left):
                     place = self._far[order, tiles.row[tile] :, tiles.column[tile] :][: tiles.side, : tiles.side]
@@ -225,7 +233,7 @@ class DiskPainting:
     def _fill(self, tiles: Tiles, coefficients: Array, order: int) -> None:
         """Fill whole tiles from Chebyshev coefficients, shape (n, channels, POINTS, POINTS)."""
         # Single precision is what is written, and enough for sums of terms of order 1.
-        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side))
+        base = at_pixels(tiles.side)[0].astype(np.float32)
         coefficients = coefficients.astype(np.float32)
         values = base @ coefficients @ base.T
         u = values[:, U].reshape(len(tiles), -1)
@@ -314,20 +322,22 @@ class DiskPainting:
         inside = (columns < self._width) & (rows < self._height)
         looked = (np.minimum(rows, self._height - 1), np.minimum(columns, self._width - 1))
         every = wanted.T[:, :, None, None] & ~self._far[:, *looked]
-        traced = every.any(axis=0)
+        traced: Mask = every.any(axis=0)
         values = np.full((self._disk.crossings, CHANNELS, *shape), np.nan)
-        values[:, :, traced], lost = self._sample(columns[traced] + 0.5, rows[traced] + 0.5, every[:, traced])
+        x, y = columns[traced].astype(np.float64) + 0.5, rows[traced].astype(np.float64) + 0.5
+        values[:, :, traced], lost = self._sample(x, y, every[:, traced])
         given_up = np.zeros(shape, dtype=bool)
         given_up[traced] = lost
         given_up &= inside
         self._unresolved[rows[given_up], columns[given_up]] = True
-        for order, traced in enumerate(values):
+        for order, channels in enumerate(values):
             chosen = np.flatnonzero(wanted[:, order])
             if not len(chosen):
                 continue
-            here = np.moveaxis(traced[:, chosen], 0, 1)
+            here: Array = np.moveaxis(channels[:, chosen], 0, 1)
             here[:, U] = np.clip(here[:, U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
-            down, across = np.gradient(here, axis=(2, 3))
+            down: Array = np.gradient(here, axis=2)
+            across: Array = np.gradient(here, axis=3)
             finer = self._needs_finer(here[:, U], across[:, U], down[:, U])
             finer &= inside[chosen]
             smooth = np.where(finer[:, None], 0.0, here)  # u = 0 is off the disk
@@ -377,23 +387,3 @@ class DiskPainting:
             flat = np.where(share[seen] == 1.0, centres[:, start : start + group][:, seen], mean)
             flat[U] = np.clip(flat[U], 1.0 / self._outer, 1.0 / self._inner)
             self._write(order, (column[seen], row[seen]), flat, share[seen])
-
-
-def _near_annulus(u: Array, low: float, high: float) -> Mask:
-    """Return which pixels of the smallest tiles may see u between `low` and `high`, shape (n, side, side).
-
-    `u` is sampled at the tiles' Chebyshev points, shape (n, POINTS, POINTS). A point is far if it and all around it
-    are off to the same side, and by a good part of what they differ by; a pixel, if the four points around it are.
-    """
-    off = np.maximum(low - u, u - high)
-    side = np.where(u > high, 1.0, -1.0)
-    padded = [np.pad(each, ((0, 0), (1, 1), (1, 1)), mode="edge") for each in (off, side, u)]
-    around = [np.lib.stride_tricks.sliding_window_view(each, (3, 3), axis=(1, 2)) for each in padded]
-    spread = around[2].max(axis=(3, 4)) - around[2].min(axis=(3, 4))
-    far = (around[0].min(axis=(3, 4)) > FAR_SHARE * spread) & (np.abs(around[1].sum(axis=(3, 4))) == 9.0)
-    tile_side = TILE_SIDES[-1]
-    before = np.searchsorted(chebyshev_places(), (np.arange(tile_side) + 0.5) / tile_side) - 1
-    first, second = np.clip(before, 0, POINTS - 1), np.clip(before + 1, 0, POINTS - 1)
-    by_row = far[:, first] & far[:, second]
-    near: Mask = ~(by_row[:, :, first] & by_row[:, :, second])
-    return near

@@ -38,7 +38,8 @@ def orbital_frequency(spin: float, radius: ArrayLike, retrograde: bool = False) 
     """
     direction = matter_direction(check_spin(spin), retrograde)
     r = np.asarray(radius, dtype=np.float64)
-    return direction / (r * np.sqrt(r) + direction * spin)
+    frequency: Array = direction / (r * np.sqrt(r) + direction * spin)
+    return frequency
 
 
 def redshift_factor(
@@ -88,7 +89,8 @@ def _circular(a: float, r: Array, b: Array, energy: Array) -> Array:
     """Return -p . u for circular geodesics: u^t (E - Omega L), u^t from BPT Eqs. 2.12, 2.16."""
     root = 1.0 / (r * np.sqrt(r))
     time = (1.0 + a * root) / np.sqrt(1.0 - 3.0 / r + 2.0 * a * root)
-    return time * (energy - b * root / (1.0 + a * root))
+    product: Array = time * (energy - b * root / (1.0 + a * root))
+    return product
 
 
 def _falling(a: float, r: Array, b: Array, energy: Array, radial: Array, isco: float) -> Array:
@@ -101,7 +103,8 @@ def _falling(a: float, r: Array, b: Array, energy: Array, radial: Array, isco: f
     inward = np.sqrt(np.maximum(p * p - delta * (r * r + drag * drag), 0.0))
     light = energy * (r * r + a * a) - a * b
     # -p . u = [(P p - Delta p_r r^2 u^r) / Delta - (b - a E)(L - a E)] / r^2, all of it multiplied out from BPT 2.9
-    return ((light * p + radial * inward) / delta - (b - a * energy) * drag) / (r * r)
+    product: Array = ((light * p + radial * inward) / delta - (b - a * energy) * drag) / (r * r)
+    return product
 
 
 def circular_constants(a: float, r: float) -> tuple[float, float]:

@@ -21,7 +21,7 @@ e = a^2 w_+ / (2 M), s^2 = M (1 - e cos(2 chi)), and 1 / s is a Fourier series w
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +41,8 @@ EXTRA_POWERS = 2
 IN_PLANE = 1e-15
 
 # For the few rays without a short series: enough for singularities 1e-8 from the path at the tightest tolerance.
-_PLANE_RULE: tuple[Array, Array] = np.polynomial.legendre.leggauss(64)
+_gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
+_PLANE_RULE = _gauss_legendre(64)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ they contribute -+ sign(P) a / (r_+ - r_-) dx / (x_+- - x): taken out and integr
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,8 @@ class RadialPath:
     def select(self, chosen: Index) -> RadialPath:
         """Return the path of the chosen rays alone."""
         values = ((field.name, getattr(self, field.name)) for field in fields(self))
-        return replace(self, **{name: value[..., chosen] for name, value in values if isinstance(value, np.ndarray)})
+        part: dict[str, Any] = {name: value[..., chosen] for name, value in values if isinstance(value, np.ndarray)}
+        return replace(self, **part)
 
     def u(self, x: Array) -> Array:
         """Return 1 / r."""
@@ -223,9 +225,9 @@ def places(path: RadialPath, times: Array, tolerance: float, beyond: bool = Fals
 def _points_and_matrices(count: int) -> tuple[Array, Array, Array, Array]:
     """Return Chebyshev points in [-1, 1], and matrices from values there to coefficients, to those of the integral from
     -1, (count + 1, count), and to that integral's values there."""
-    angle = np.pi * (count - 0.5 - np.arange(count)) / count
+    angle: Array = np.pi * (count - 0.5 - np.arange(count)) / count
     order = np.arange(count)[:, None]
-    to_series = np.cos(order * angle) * (2.0 / count)
+    to_series: Array = np.cos(order * angle) * (2.0 / count)
     to_series[0] *= 0.5
     # integral of T_j is T_(j+1) / (2 (j + 1)) - T_(j-1) / (2 (j - 1))
     integrate = np.zeros((count + 1, count))
@@ -235,8 +237,9 @@ def _points_and_matrices(count: int) -> tuple[Array, Array, Array, Array]:
             integrate[j - 1, j] -= 0.5 / (j - 1)
     integrate[0] -= ((-1.0) ** np.arange(count + 1)) @ integrate
     to_integral = integrate @ to_series
-    at_points = np.cos(np.arange(count + 1) * angle[:, None]) @ to_integral
-    return np.cos(angle), to_series[-TAIL:], to_integral, at_points
+    at_points: Array = np.cos(np.arange(count + 1) * angle[:, None]) @ to_integral
+    points: Array = np.cos(angle)
+    return points, to_series[-TAIL:], to_integral, at_points
 
 
 def _product(matrix: Array, values: Array) -> Array:
@@ -285,16 +288,17 @@ class _Series:
 
     def place(self, z: Array) -> tuple[Array, Array]:
         """Return x and dx / dz at z."""
-        t = z * self.half + self.middle
-        if not self.stretched.any():
-            x, slope = self._fold(t)
-            return x, slope * self.half
-        s = np.where(self.stretched, t, 0.0)
-        grown = np.exp(s)
-        shrunk = 1.0 / grown
-        t = np.where(self.stretched, self.centre + (0.5 * self.scale) * (grown - shrunk), t)
+        t: Array = z * self.half + self.middle
+        rate: Array | float = 1.0
+        if self.stretched.any():
+            chosen = self.stretched
+            grown = np.exp(t[..., chosen])
+            shrunk, half = 1.0 / grown, 0.5 * self.scale[chosen]
+            t[..., chosen] = self.centre[chosen] + half * (grown - shrunk)
+            rate = np.ones_like(t)
+            rate[..., chosen] = half * (grown + shrunk)
         x, slope = self._fold(t)
-        return x, np.where(self.stretched, (0.5 * self.scale) * (grown + shrunk), 1.0) * (slope * self.half)
+        return x, slope * self.half * rate
 
     def _fold(self, t: Array) -> tuple[Array, Array]:
         """Return x and dx / dt of the substitution that takes the branch point at `far` out of the integrands."""
@@ -312,15 +316,17 @@ class _Series:
         if self.path.sign > 0.0:
             return x
         if not self.path.squared:
-            return -np.sqrt(self.path.far - x)
+            root: Array = -np.sqrt(self.path.far - x)
+            return root
         share = x / self.path.far
         t: Array = share / (1.0 + np.sqrt(1.0 - share * share))
         return t
 
     def _pole(self, x: Array, place: Array, residue: Array) -> Array:
         if self.path.squared:
-            return 2.0 * place * residue / ((place - x) * (place + x))
-        return residue / (place - x)
+            residue = 2.0 * place * residue / (place + x)
+        density: Array = residue / (place - x)
+        return density
 
     def _pole_integral(self, x: Array, place: Array, residue: Array) -> Array:
         start = self.path.start

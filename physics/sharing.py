@@ -39,8 +39,8 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
         None unless everything but the azimuth and the hole's orientation agrees to within half of the
         interpolation error that the parameters allow, which for `interpolation` 0 means exactly, and to a hundredth of
         a pixel, so that a slow pan of a long lens is not taken for a standstill. Directions are as
-        good as the earlier map's, visibility and redshift are its own, and so are a disk's passes but for their azimuth. To keep errors from adding up over many
-        frames, always turn the same map.
+        good as the earlier map's, visibility and redshift are its own, and a disk's passes too but for their azimuth.
+        To keep errors from adding up over many frames, always turn the same map.
     """
     before = WarpMapParameters.from_metadata(earlier.metadata["parameters"])
     if _without_place(before) != _without_place(parameters):

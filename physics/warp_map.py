@@ -78,7 +78,7 @@ def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]
     """
     parameters.validate()
     painting = Painting(parameters)
-    metadata = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
+    metadata: dict[str, Any] = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
     if parameters.disk is None:
         yield from painting.steps()
         return WarpMap(*painting.planes, {**metadata, "counts": painting.counts()})

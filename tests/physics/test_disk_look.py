@@ -53,7 +53,7 @@ def amplitude(k2, start, value):
 
 
 def luminet_radius(b, gamma):
-    """Radius where a ray of impact parameter b is at the angle gamma from the far camera: Luminet 1979, Eqs. 6 and 13."""
+    """Radius where a ray of impact parameter b is at the angle gamma from the camera: Luminet 1979, Eqs. 6 and 13."""
     p = 2.0 * b / math.sqrt(3.0) * math.cos(math.acos(-3.0 * math.sqrt(3.0) / b) / 3.0)  # b^2 = P^3 / (P - 2)
     q = math.sqrt((p - 2.0) * (p + 6.0))
     k2 = (q - p + 6.0) / (2.0 * q)
@@ -71,7 +71,8 @@ def test_the_direct_image_has_luminets_isoradial_curves(inclination):
     for i in np.ndindex(b.shape):
         # From the far camera's direction along the ray's plane to where that plane meets the disk (Luminet, Eq. 10):
         # up on the picture, cos(alpha) > 0, the far side is seen, more than a right angle away.
-        gamma = math.acos(-math.cos(alpha[i]) / math.hypot(math.cos(alpha[i]), 1.0 / math.tan(math.radians(inclination))))
+        level = math.hypot(math.cos(alpha[i]), 1.0 / math.tan(math.radians(inclination)))
+        gamma = math.acos(-math.cos(alpha[i]) / level)
         expected = luminet_radius(b[i], gamma)
         if 6.0 < expected < 40.0:
             # The camera is 1e6 M away, not infinitely far: that changes angles by r / 1e6.
@@ -112,7 +113,8 @@ def test_ansae_differ_in_brightness_as_doppler_says():
     assert b == pytest.approx(other_b, rel=1e-6)
     doppler = (1.0 + radius**-1.5 * b * sin_i) / (1.0 - radius**-1.5 * b * sin_i)
     one, other = (
-        emission(look, disk, 0.0, np.array([radius]), side.g[:1])[0] @ [0.2126, 0.7152, 0.0722] for side in (left, right)
+        emission(look, disk, 0.0, np.array([radius]), side.g[:1])[0] @ [0.2126, 0.7152, 0.0722]
+        for side in (left, right)
     )
     assert one / other == pytest.approx(doppler**4, rel=1e-3)
     narrow = dataclasses.replace(look, beaming=3)
@@ -157,7 +159,7 @@ SPINS = [(0.0, False), (0.5, False), (0.998, False), (-0.7, False), (0.9, True)]
 
 @pytest.mark.parametrize(("spin", "retrograde"), SPINS)
 def test_flux_is_the_integral_that_defines_it(spin, retrograde):
-    """f = -Omega' / (E - Omega L)^2 times the integral of (E - Omega L) L' dr (Page & Thorne 1974, Eq. 15n first line)."""
+    """f = -Omega' / (E - Omega L)^2 times the integral of (E - Omega L) L' dr (Page & Thorne 1974, Eq. 15 n)."""
     a = -abs(spin) if retrograde else abs(spin)
     isco = isco_radius(spin, prograde=not retrograde)
     nodes, weights = np.polynomial.legendre.leggauss(80)
@@ -237,7 +239,8 @@ def test_texture_repeats_and_moves_with_the_matter():
     time, step = 0.5 * period, 1e-4 * period
     phi = np.linspace(0.0, 6.0, 50)
     before = moving_texture(TEXTURE, radius, phi, time, spin, inner, outer)
-    after = moving_texture(TEXTURE, radius, phi + orbital_frequency(spin, radius) * step, time + step, spin, inner, outer)
+    carried = phi + orbital_frequency(spin, radius) * step
+    after = moving_texture(TEXTURE, radius, carried, time + step, spin, inner, outer)
     still = moving_texture(TEXTURE, radius, phi, time + step, spin, inner, outer)
     assert np.abs(after - before).max() < 0.1 * np.abs(still - before).max()
 
