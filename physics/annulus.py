@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .rays import Array
-from .tiles import POINTS, TILE_SIDES, chebyshev_places
+from .tiles import TILE_SIDES, chebyshev_places
 
 # A slope along one axis of less than this share of the other's counts as that.
 LEAST_SLOPE = 1e-4
@@ -63,7 +63,7 @@ def nearest_covered(u: Array, slope_x: Array, slope_y: Array, inner: float, oute
 def near_annulus(u: Array, low: float, high: float) -> NDArray[np.bool_]:
     """Return which pixels of the smallest tiles may see u between `low` and `high`, shape (n, side, side).
 
-    `u` is sampled at the tiles' Chebyshev points, shape (n, POINTS, POINTS). A point is far if it and all around it
+    `u` is sampled at the tiles' Chebyshev points, shape (n, count, count). A point is far if it and all around it
     are off to the same side, and by a good part of what they differ by; a pixel, if the four points around it are.
     """
     off = np.maximum(low - u, u - high)
@@ -71,9 +71,9 @@ def near_annulus(u: Array, low: float, high: float) -> NDArray[np.bool_]:
     highest = [_around(each, np.maximum) for each in (u, side)]
     lowest = [_around(each, np.minimum) for each in (u, side, off)]
     far = (lowest[2] > FAR_SHARE * (highest[0] - lowest[0])) & (highest[1] == lowest[1])
-    tile_side = TILE_SIDES[-1]
-    before = np.searchsorted(chebyshev_places(), (np.arange(tile_side) + 0.5) / tile_side) - 1
-    first, second = np.clip(before, 0, POINTS - 1), np.clip(before + 1, 0, POINTS - 1)
+    tile_side, count = TILE_SIDES[-1], u.shape[-1]
+    before = np.searchsorted(chebyshev_places(count), (np.arange(tile_side) + 0.5) / tile_side) - 1
+    first, second = np.clip(before, 0, count - 1), np.clip(before + 1, 0, count - 1)
     by_row = far[:, first] & far[:, second]
     near: NDArray[np.bool_] = ~(by_row[:, :, first] & by_row[:, :, second])
     return near

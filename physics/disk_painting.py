@@ -23,7 +23,6 @@ from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
 from .tiles import (
-    POINTS,
     TAIL,
     TAIL_SHARE,
     TILE_SIDES,
@@ -41,6 +40,10 @@ Image = NDArray[np.float32]
 
 # Error of place on the disk, relative, for each radian of error of direction that is allowed.
 PLACE_ERROR = 40.0
+# Chebyshev points along each side of a tile: the sky, which has to be better known, has more.
+DISK_POINTS = 8
+# Rays need be better than that by this only.
+TRACING_SHARE = 0.1
 # Where the image is crowded, this share of the way from pixel to pixel will do.
 PIXEL_ERROR = 0.03
 
@@ -53,10 +56,10 @@ LOWEST_U, HIGHEST_U = -30.0, 20.0
 LOWEST_STEP, HIGHEST_STEP = -2.0, 4.0
 
 # Places along each side of a pixel that is divided.
-FINER = 4
+FINER = 3
 
 # A rim bent by more than this share of a pixel within the pixel is not taken for straight.
-LARGEST_BEND = 0.03
+LARGEST_BEND = 0.05
 
 # Circles and places on each that mark where the disk is, for tiles whose samples may miss it.
 MARKED_CIRCLES, MARKED_PLACES = 8, 256
@@ -85,6 +88,7 @@ class DiskPainting:
         self._inner, self._outer = self._disk.radii(parameters.spin)
         nearest = max(NEAREST_G * horizon_radius(parameters.spin), INNERMOST_G * self._inner)
         self._bounds_of_g = 1.0 / (FARTHEST_G * self._outer), 1.0 / nearest
+        self._tolerance = max(parameters.tolerance, TRACING_SHARE * PLACE_ERROR * parameters.interpolation)
         self._view = View(parameters)
         self._width, self._height = parameters.map_size
         self._planes = np.zeros((self._disk.crossings, 4, self._height, self._width), np.float32)
@@ -129,7 +133,7 @@ class DiskPainting:
                 x[block],
                 y[block],
                 self._disk.crossings,
-                self._parameters.tolerance,
+                self._tolerance,
                 self._parameters.method,
                 wanted[:, block],
             )
@@ -155,7 +159,7 @@ class DiskPainting:
         done, share = 0.0, 0.6 / len(TILE_SIDES)
         for side in TILE_SIDES:
             marked = self._marked(waiting, marked_x, marked_y)
-            group = max(1, BLOCK_SIZE // POINTS**2)
+            group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
                 self._judge(waiting.select(part), marked[part], wanted, part)
@@ -197,9 +201,9 @@ class DiskPainting:
 
     def _judge(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
         """Sample tiles, fill what they determine and strike it from `wanted`, whose rows `part` they are."""
-        x, y = sample_places(tiles)
-        values, lost = self._sample(x, y, np.repeat(wanted[part].T, POINTS**2, axis=1))
-        values = values.reshape(*values.shape[:2], len(tiles), POINTS, POINTS)
+        x, y = sample_places(tiles, DISK_POINTS)
+        values, lost = self._sample(x, y, np.repeat(wanted[part].T, DISK_POINTS**2, axis=1))
+        values = values.reshape(*values.shape[:2], len(tiles), DISK_POINTS, DISK_POINTS)
         broken = lost.reshape(len(tiles), -1).any(axis=1)
         allowed = PLACE_ERROR * self._parameters.interpolation
         for order, sampled in enumerate(values):
@@ -231,9 +235,9 @@ class DiskPainting:
                     place[:] = ~near[i, : place.shape[0], : place.shape[1]]
 
     def _fill(self, tiles: Tiles, coefficients: Array, order: int) -> None:
-        """Fill whole tiles from Chebyshev coefficients, shape (n, channels, POINTS, POINTS)."""
+        """Fill whole tiles from Chebyshev coefficients, shape (n, channels, DISK_POINTS, DISK_POINTS)."""
         # Single precision is what is written, and enough for sums of terms of order 1.
-        base = at_pixels(tiles.side)[0].astype(np.float32)
+        base = at_pixels(tiles.side, DISK_POINTS)[0].astype(np.float32)
         coefficients = coefficients.astype(np.float32)
         values = base @ coefficients @ base.T
         u = values[:, U].reshape(len(tiles), -1)
@@ -249,7 +253,7 @@ class DiskPainting:
 
     def _put_rim(self, order: int, tiles: Tiles, coefficients: Array, values: Array) -> None:
         """Write tiles with a rim in them from Chebyshev coefficients and the channels, (n, channels, side, side)."""
-        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side))
+        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
         u, across, down = values[:, U], base @ coefficients[:, U] @ slope.T, slope @ coefficients[:, U] @ base.T
         columns, rows = (np.broadcast_to(each, u.shape) for each in tiles.pixels())
         share = coverage(u, across, down, self._inner, self._outer)

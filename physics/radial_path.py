@@ -37,7 +37,7 @@ POINT_COUNTS = (16, 24, 32, 64, 128)
 SMALL_PRODUCT = 200_000
 
 # Rays worked through at a time: their samples stay in the cache.
-CHUNK = 2048
+CHUNK = 4096
 
 # Highest coefficients that tell the error, and the share of the tolerance that they may amount to.
 # Integration divides the k-th coefficient by 2 k: what is left out of lambda is far smaller than what its derivative
