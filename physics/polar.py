@@ -125,7 +125,8 @@ class PolarMotion:
             The azimuth is unwrapped and lacks psi; both are NaN for rays that never cross: q < 0, or motion in the
             plane for ever.
         """
-        height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
+        with np.errstate(invalid="ignore"):
+            height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
         if abs(height) < IN_PLANE:  # cos(pi / 2) in floating point is not 0
             height = 0.0
         crosses = (self.base > 0.0) & (np.hypot(height, rise) > IN_PLANE)
@@ -139,8 +140,10 @@ class PolarMotion:
             if len(chosen):
                 time[:, chosen], turn[:, chosen] = integrals(chosen, first[chosen], tolerance)
         cos, sin = np.cos(first), np.sin(first)
+        # Rays that never cross may have no tangent either.
+        along_theta, along_phi = (np.where(crosses, each, 0.0) for each in (self.tangent_theta, self.tangent_phi))
         x, y = (
-            self.triad[0, i] * cos + (self.triad[1, i] * self.tangent_theta + self.triad[2, i] * self.tangent_phi) * sin
+            self.triad[0, i] * cos + (self.triad[1, i] * along_theta + self.triad[2, i] * along_phi) * sin
             for i in (0, 1)
         )
         order = np.arange(count)[:, None]
