@@ -37,9 +37,12 @@ def image_plane(spin, inclination, b, alpha, **settings):
     return trace_disk(spin, Observer.static(spin, FAR, theta, 0.0), theta_rd, phi_rd, tolerance=1e-9, **settings)
 
 
+NODES = np.polynomial.legendre.leggauss(60)
+
+
 def elliptic(k2, low, high):
     """The incomplete elliptic integral of the first kind between two amplitudes, by quadrature."""
-    nodes, weights = np.polynomial.legendre.leggauss(60)
+    nodes, weights = NODES
     angle = low + 0.5 * (high - low) * (1.0 + nodes)
     return 0.5 * (high - low) * float(np.sum(weights / np.sqrt(1.0 - k2 * np.sin(angle) ** 2)))
 
@@ -48,7 +51,10 @@ def amplitude(k2, start, value):
     """The amplitude at which the integral from `start` reaches `value`, by Newton's method."""
     angle = start
     for _ in range(50):
-        angle -= (elliptic(k2, start, angle) - value) * math.sqrt(1.0 - k2 * math.sin(angle) ** 2)
+        change = (elliptic(k2, start, angle) - value) * math.sqrt(1.0 - k2 * math.sin(angle) ** 2)
+        angle -= change
+        if abs(change) < 1e-13:
+            break
     return angle
 
 
