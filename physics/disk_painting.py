@@ -162,7 +162,7 @@ class DiskPainting:
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
-                self._judge(waiting.select(part), marked[part], wanted, part)
+                self._settle(waiting.select(part), marked[part], wanted, part)
                 yield done + share * (start + len(part)) / len(waiting)
             done += share
             left = wanted.any(axis=1)
@@ -199,7 +199,7 @@ class DiskPainting:
         marked: Mask = np.isin(tiles.row // tiles.side * columns + tiles.column // tiles.side, places)
         return marked
 
-    def _judge(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
+    def _settle(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
         """Sample tiles, fill what they determine and strike it from `wanted`, whose rows `part` they are."""
         x, y = sample_places(tiles, DISK_POINTS)
         values, lost = self._sample(x, y, np.repeat(wanted[part].T, DISK_POINTS**2, axis=1))
