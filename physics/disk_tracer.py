@@ -46,7 +46,14 @@ def _without_steps(
 def _by_steps(
     rays: Rays, count: int, tolerance: float, max_steps: int, beyond: bool, wanted: NDArray[np.bool_] | None
 ) -> Crossings:
-    return step_to_plane(rays, count, tolerance, max_steps)
+    """Return crossings by steps; beyond a ray's end, where there is nothing to step along, as without steps."""
+    found = step_to_plane(rays, count, tolerance, max_steps)
+    if beyond:
+        ended = np.isnan(found.u) & (found.fate != Fate.UNRESOLVED)
+        other = cross_plane(rays, count, tolerance, beyond=True)
+        for name in ("u", "u_slope", "phi"):
+            np.copyto(getattr(found, name), getattr(other, name), where=ended)
+    return found
 
 
 DISK_METHODS: dict[str, Crosser] = {"gauss-legendre": _without_steps, "cash-karp": _by_steps}

@@ -112,6 +112,15 @@ def test_tracing_every_pixel_gives_the_same():
             assert np.quantile(np.abs(one.radius / np.where(both, other.radius, 1.0) - 1.0)[both], 0.99) < 2e-3
 
 
+def test_passes_traced_by_steps_are_the_same():
+    parameters = shot(32, 18, radius=30.0, fov=50.0, motion="fido", spin=0.9, disk=Disk(crossings=2))
+    by_steps = bake(dataclasses.replace(parameters, method="cash-karp", interpolation=0.0))
+    assert by_steps.counts["disk_unresolved"] == 0
+    for one, other in zip(bake(parameters).disk_passes, by_steps.disk_passes, strict=True):
+        assert one.coverage == pytest.approx(other.coverage, abs=1e-3)
+        assert one.radius == pytest.approx(other.radius, rel=1e-3)
+
+
 def test_the_share_of_a_square_above_a_plane():
     random = np.random.default_rng(0)
     x, y = np.meshgrid((np.arange(200) + 0.5) / 200 - 0.5, (np.arange(200) + 0.5) / 200 - 0.5)
