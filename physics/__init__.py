@@ -3,6 +3,10 @@
 
 from .background import Background
 from .cameras import PanoramaCamera, PerspectiveCamera
+from .disk import Disk
+from .disk_pass import DiskPass
+from .disk_pass_file import read_disk_pass, write_disk_pass
+from .disk_tracer import DEFAULT_CROSSINGS, DiskResult, trace_disk
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
 from .sharing import MapBaker, turned_map
@@ -19,6 +23,7 @@ from .warp_map import WarpMap, bake, bake_steps
 from .warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
 
 __all__ = [
+    "DEFAULT_CROSSINGS",
     "DEFAULT_INTERPOLATION",
     "DEFAULT_METHOD",
     "DEFAULT_TOLERANCE",
@@ -28,6 +33,9 @@ __all__ = [
     "Background",
     "BlackHoleError",
     "Cancelled",
+    "Disk",
+    "DiskPass",
+    "DiskResult",
     "Fate",
     "ImageFileError",
     "MapBaker",
@@ -42,10 +50,13 @@ __all__ = [
     "bake",
     "bake_steps",
     "looking_at_hole",
+    "read_disk_pass",
     "read_warp_map",
     "read_warp_map_metadata",
+    "trace_disk",
     "trace_rays",
     "turned_map",
     "unstable_orbit_warning",
+    "write_disk_pass",
     "write_warp_map",
 ]

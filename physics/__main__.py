@@ -10,6 +10,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from . import disk_command
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
 from .exr import read_exr, write_exr
@@ -79,6 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     baking.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
 
+    disk_command.add_bake_options(baking)
+
     rendering = commands.add_parser(
         "render",
         help="make the picture of a warp map over an equirectangular sky",
@@ -95,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     rendering.add_argument("--redshift-colour", type=float, default=1.0, help="0 off, 1 physical")
     rendering.add_argument("--redshift-brightness", type=float, default=1.0, help="0 off, 1 physical")
     rendering.add_argument("--temperature", type=float, default=6500.0, help="of the sky's light, kelvin")
+    disk_command.add_render_options(rendering)
     return parser
 
 
@@ -128,6 +132,7 @@ def _bake(options: argparse.Namespace) -> None:
         tolerance=options.tolerance,
         method=options.method,
         interpolation=options.interpolation,
+        disk=disk_command.disk_of(options),
     )
     parameters.validate()
     warning = unstable_orbit_warning(parameters)
@@ -135,12 +140,18 @@ def _bake(options: argparse.Namespace) -> None:
         print(f"note: {warning}", file=sys.stderr)
     started = time.perf_counter()
     warp_map = bake(parameters, progress=_ProgressPrinter())
+    passes = disk_command.write_passes(options.output, warp_map)
     write_warp_map(options.output, warp_map)
     counts = dict(warp_map.counts)
-    rays = counts.pop("rays") + counts.pop("shared")
+    rays = counts.pop("rays") + counts.pop("shared") + counts.pop("disk_rays", 0)
+    lost = counts.pop("disk_unresolved", 0)
     pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
     print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels from {rays} rays")
     unresolved = warp_map.counts["unresolved"]
+    for path in passes:
+        print(f"wrote {path}")
+    if lost:
+        print(f"note: the disk could not be resolved in {lost} pixels and is missing there", file=sys.stderr)
     if unresolved:
         print(f"note: {unresolved} pixels could not be resolved and will show magenta", file=sys.stderr)
 
@@ -165,10 +176,11 @@ def _render(options: argparse.Namespace) -> None:
         exposure=options.exposure,
         output_size=(camera["width"], camera["height"]),
     )
+    image = disk_command.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
     if options.output.suffix.lower() == ".png":
-        write_png(options.output, picture.image)
+        write_png(options.output, image)
     else:
-        write_exr(options.output, picture.image.astype("float32"))
+        write_exr(options.output, image.astype("float32"))
     print(f"wrote {options.output}")
 
 

@@ -55,6 +55,8 @@ _WEIGHTS = (_SMALL, _LARGE, 64.0 / 225.0, _LARGE, _SMALL)
 # its cube, is below rounding.
 HALLEY_ROUNDS = 16
 HALLEY_CHANGE = 4e-6
+# Bisection alone, where Newton's method keeps leaving the bracket, ends after this many.
+BRACKETED_ROUNDS = 60
 
 
 def radial_polynomial(rays: Rays) -> tuple[Array, Array, Array]:
@@ -221,10 +223,15 @@ class DirectRays(MinoSystem):
         return x
 
 
-def direct_polynomial(rays: Rays, barrier: Barrier) -> tuple[Array, Array, Array]:
-    """Return x at the camera and u_c, shape (n,), and the polynomial U / u_c^2 in x of `DirectRays`, shape (5, n)."""
+def direct_polynomial(
+    rays: Rays, barrier: Barrier, inward: bool = False
+) -> tuple[Array, Array, Array]:
+    """Return x at the camera and u_c, shape (n,), and the polynomial U / u_c^2 in x of `DirectRays`, shape (5, n).
+
+    The barrier is ahead of rays that go out from inside it and, where these are meant, of those that come `inward`.
+    """
     r = rays.observer.r
-    ahead = barrier.radius > r
+    ahead = (barrier.radius < r) if inward else (barrier.radius > r)
     unit = 1.0 / np.where(ahead, barrier.radius, r)
     square = unit * unit
     c2, c3, c4 = radial_polynomial(rays)
@@ -277,11 +284,47 @@ def _turning_point(rays: Rays, barrier: Barrier) -> tuple[Array, Array]:
             break
     r_t = r_m + h
     u_t = 1.0 / r_t
+    return u_t, _rates_at_root(rays, u_t, h * (2.0 * half + h * (12.0 * r_m + 4.0 * h)))
+
+
+def inner_turning_polynomial(rays: Rays, barrier: Barrier) -> tuple[Array, Array, Array]:
+    """Return what `turning_polynomial` does for rays inside their barrier, which turn them back to the hole.
+
+    There u = u_t (1 + x^2): x runs from the camera, negative on the way out, through 0 to the horizon, and with
+    s = -x^2 in U = u_t^2 s G(s), x'^2 = -G(-x^2) / 4. The root lies h below r_m,
+    -|R(r_m)| + R'' / 2 h^2 - 4 r_m h^3 + h^4 = 0, between 0 and the camera; Newton's method in h, held in that bracket.
+    """
+    r = rays.observer.r
+    r_m, half, depth = barrier.radius, barrier.curvature, -barrier.height
+    low, high = np.zeros_like(r_m), r_m - r
+    with np.errstate(divide="ignore", invalid="ignore"):
+        h = np.minimum(np.sqrt(depth / half), high)
+        for _ in range(BRACKETED_ROUNDS):
+            excess = h * h * (half - h * (4.0 * r_m - h)) - depth
+            low, high = np.where(excess < 0.0, h, low), np.where(excess < 0.0, high, h)
+            change = excess / (h * (2.0 * half - h * (12.0 * r_m - 4.0 * h)))
+            following = h - change
+            held = (following >= low) & (following <= high)
+            following = np.where(held, following, 0.5 * (low + high))
+            done = np.abs(following - h) <= 4.0 * np.finfo(float).eps * h
+            h = following
+            if np.all(done):
+                break
+    u, u_t = 1.0 / r, 1.0 / (r_m - h)
+    g = 0.25 * _rates_at_root(rays, u_t, -h * (2.0 * half - h * (12.0 * r_m - 4.0 * h)))
+    rates = np.stack([-g[0], g[1], -g[2], g[3]])
+    apart = np.maximum(u / u_t - 1.0, 0.0)
+    slope = np.sqrt(rates[0] + apart * (rates[1] + apart * (rates[2] + apart * rates[3])))
+    start = rays.radial * (u * u) / (2.0 * u_t * slope)
+    return start, u_t, rates
+
+
+def _rates_at_root(rays: Rays, u_t: Array, slope: Array) -> Array:
+    """Return g_0 .. g_3 of G, shape (4, n), at a root of R where R' is `slope`."""
     c2, c3, c4 = radial_polynomial(rays)
-    rates = np.stack([
-        h * (2.0 * half + h * (12.0 * r_m + 4.0 * h)) * u_t,  # R'(r_t) / r_t
+    return np.stack([
+        slope * u_t,  # R'(r_t) / r_t
         c2 + u_t * (3.0 * c3 + 6.0 * c4 * u_t),
         -u_t * (c3 + 4.0 * c4 * u_t),
         c4 * u_t * u_t,
     ])
-    return u_t, rates

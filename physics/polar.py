@@ -21,7 +21,7 @@ e = a^2 w_+ / (2 M), s^2 = M (1 - e cos(2 chi)), and 1 / s is a Fourier series w
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,13 @@ ELLIPTICITY_CLASSES = (0.0, 0.04, 0.3)
 MOST_TERMS = 12
 # Powers of e kept beyond the last harmonic: a harmonic k is made of the powers k, k + 2, ...
 EXTRA_POWERS = 2
+
+# A height above the equatorial plane, or a slope towards it, of less than this is rounding.
+IN_PLANE = 1e-15
+
+# For the few rays without a short series: enough for singularities 1e-8 from the path at the tightest tolerance.
+_gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
+_PLANE_RULE = _gauss_legendre(64)
 
 
 @dataclass(frozen=True)
@@ -66,8 +73,8 @@ class PolarMotion:
         a2, w0 = rays.spin * rays.spin, triad[0, 2] * triad[0, 2]
         reduced = rays.carter - a2
         root = np.sqrt(np.maximum(reduced * reduced + 4.0 * a2 * rays.q, 0.0))
-        base = 0.5 * (reduced + root)
         with np.errstate(invalid="ignore", divide="ignore"):
+            base = np.where(reduced < 0.0, 2.0 * a2 * rays.q / (root - reduced), 0.5 * (reduced + root))
             pole_speed = np.sqrt(base + a2)
             tangent_theta = -rays.polar / np.sqrt(base + a2 * w0)
             tangent_phi = -rays.azimuthal / pole_speed
@@ -97,15 +104,101 @@ class PolarMotion:
     def direction(self, mino_time: Array, rotation: Array, tolerance: float) -> Array:
         """Return the unit vectors after `mino_time`, turned about the axis by `rotation` more, shape (3, n)."""
         direction = np.empty((3, len(mino_time)))
-        below = np.zeros(len(mino_time), dtype=bool)
+        for chosen, largest in self._classes():
+            part = self.select(chosen)
+            direction[:, chosen] = part._direction(mino_time[chosen], rotation[chosen], largest, tolerance)
+        return direction
+
+    def _classes(self) -> Iterator[tuple[Indices, float]]:
+        """Yield the rays of each class of `ELLIPTICITY_CLASSES`, and the largest e of that class."""
+        below = np.zeros(len(self.ellipticity), dtype=bool)
         for largest in ELLIPTICITY_CLASSES:
             members = (self.ellipticity <= largest) & ~below
             if members.any():
-                chosen = indices(members)
-                part = self.select(chosen)
-                direction[:, chosen] = part._direction(mino_time[chosen], rotation[chosen], largest, tolerance)
+                yield indices(members), largest
                 below |= members
-        return direction
+
+    def plane_crossings(self, count: int, tolerance: float) -> tuple[Array, Array]:
+        """Return when and where the rays cross the equatorial plane for the first `count` times, the camera excluded.
+
+        v = 0 is chi = k pi, where the series in sin(2 chi) vanish: both answers are linear in chi from there on. Rays
+        that the series do not serve, of q > 0 but little angular momentum, have their integrals over chi worked out
+        by quadrature.
+
+        Returns
+        -------
+        mino_time, azimuth : ndarray, shape (count, n)
+            The azimuth is unwrapped and lacks psi; both are NaN for rays that never cross: q < 0, or motion in the
+            plane for ever.
+        """
+        with np.errstate(invalid="ignore"):
+            height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
+        if abs(height) < IN_PLANE:  # cos(pi / 2) in floating point is not 0
+            height = 0.0
+        crosses = (self.base > 0.0) & (np.hypot(height, rise) > IN_PLANE)
+        first = np.arctan2(abs(height), -rise * np.copysign(1.0, height)) if height else np.full(len(rise), np.pi)
+        usable = crosses & self.usable(tolerance)
+        time, turn = np.full((2, len(rise)), np.nan), np.full((2, len(rise)), np.nan)  # first, and from one to the next
+        for chosen, integrals in (
+            (np.flatnonzero(usable), self._series_to_plane),
+            (np.flatnonzero(crosses & ~usable), self._quadrature_to_plane),
+        ):
+            if len(chosen):
+                time[:, chosen], turn[:, chosen] = integrals(chosen, first[chosen], tolerance)
+        cos, sin = np.cos(first), np.sin(first)
+        # Rays that never cross may have no tangent either.
+        along_theta, along_phi = (np.where(crosses, each, 0.0) for each in (self.tangent_theta, self.tangent_phi))
+        x, y = (
+            self.triad[0, i] * cos + (self.triad[1, i] * along_theta + self.triad[2, i] * along_phi) * sin
+            for i in (0, 1)
+        )
+        order = np.arange(count)[:, None]
+        turn[1] += np.copysign(np.pi, self.b)
+        return time[0] + order * time[1], np.arctan2(y, x) + turn[0] + order * turn[1]
+
+    def _series_to_plane(self, chosen: NDArray[np.intp], first: Array, tolerance: float) -> tuple[Array, Array]:
+        """Return Mino time and drift to the first crossing and from one to the next, shape (2, n) each."""
+        part, a2 = self.select(chosen), self.spin * self.spin
+        time, turn = np.empty((2, len(chosen))), np.zeros((2, len(chosen)))
+        for members, largest in part._classes():
+            rays = part.select(members)
+            angle = np.stack([first[members], np.full(len(rays.b), np.pi)])
+            v, vertical = rays.triad[0, 2], rays.triad[1, 2] * rays.tangent_theta
+            swing = 0.5 * a2 / rays.mean
+            start = swing * (vertical * vertical - v * v), 2.0 * swing * vertical * v
+            speeds = _speed_series(rays.ellipticity, largest, tolerance)
+            scale = np.sqrt(rays.mean)
+            time[:, members] = speeds[0] * angle / scale
+            time[0, members] -= _harmonics(speeds, *start) / scale
+            if a2 > 0.0:
+                drift = _turn_series(rays.pole_speed / scale, rays.ellipticity, len(speeds))
+                path = drift[0] * angle
+                path[0] -= _harmonics(drift, *start)
+                turn[:, members] = path * (a2 * rays.b / (rays.pole_speed * rays.mean))
+        return time, turn
+
+    def _quadrature_to_plane(self, chosen: NDArray[np.intp], first: Array, tolerance: float) -> tuple[Array, Array]:
+        """Return what `_series_to_plane` does, by Gauss-Legendre quadrature of 1 / s and f over chi.
+
+        1 / s is singular at sin(chi) = +-i eps, eps^2 = A / (a^2 w_+), which chi = eps sinh(t) keeps away.
+        """
+        part, a2 = self.select(chosen), self.spin * self.spin
+        swing = 2.0 * part.mean * part.ellipticity  # a^2 w_+
+        near = np.sqrt(part.base / swing)
+        nodes, weights = (each[:, None] for each in _PLANE_RULE)
+
+        def integrals(angle: Array) -> Array:
+            half = 0.5 * np.arcsinh(angle / near)
+            t = half * (1.0 + nodes)
+            speed = np.sqrt(part.base + swing * np.sin(near * np.sinh(t)) ** 2)
+            step = weights * half * near * np.cosh(t) / speed
+            drift = step * (a2 * part.b / part.pole_speed) / (speed + part.pole_speed)
+            return np.stack([step.sum(axis=0), drift.sum(axis=0)])
+
+        quarter = integrals(np.full(len(chosen), 0.5 * np.pi))
+        ahead = integrals(np.minimum(first, np.pi - first))
+        to_first = np.where(first > 0.5 * np.pi, 2.0 * quarter - ahead, ahead)
+        return np.stack([to_first[0], 2.0 * quarter[0]]), np.stack([to_first[1], 2.0 * quarter[1]])
 
     def select(self, chosen: Indices) -> PolarMotion:
         """Return the motion of the chosen rays alone."""

@@ -93,7 +93,7 @@ def turning_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[A
         root = np.sqrt(np.maximum(g1 * g1 - 4.0 * g0 * g2, 0.0))
         near = np.sqrt(np.where(g1 > 0.0, 2.0 * g0 / (g1 + root), FAR_AWAY))
     near = np.minimum(near, FAR_AWAY)
-    far = np.sqrt(1.0 + _negative_root(rays) / turning)
+    far = np.sqrt(1.0 + negative_root(rays) / turning)
     horizon = np.sqrt(1.0 / (horizon_radius(rays.spin) * turning) - 1.0)
     integrand = _Integrand(rays.spin, rays.b, rates, np.square, turning, start, near, far, horizon)
     goal, crowded_goal = _goals(tolerance)
@@ -112,7 +112,7 @@ def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Ar
         shares = np.abs(0.25 * rates[0] / rates[1:])
         near = np.minimum(np.minimum(shares[0], np.sqrt(shares[1])), np.cbrt(shares[2]))
         near = np.minimum(np.minimum(near, np.sqrt(np.sqrt(shares[3]))), FAR_AWAY)
-    far = 1.0 + _negative_root(rays) / unit
+    far = 1.0 + negative_root(rays) / unit
     horizon = 1.0 / (horizon_radius(rays.spin) * unit) - 1.0
     integrand = _Integrand(rays.spin, rays.b, rates, np.positive, unit, start, near, far, horizon)
     _, crowded_goal = _goals(tolerance)
@@ -121,7 +121,7 @@ def direct_integrals(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Ar
     return _integrals(integrand, _nodes(crowded_goal, axes / (1.0 - start)), crowded_goal)
 
 
-def _negative_root(rays: Rays) -> Array:
+def negative_root(rays: Rays) -> Array:
     """Return -u at U's negative root, shape (n,): 1 = u^2 (-c_2 + c_3 |u| - c_4 u^2), by fixed point."""
     c2, c3, c4 = radial_polynomial(rays)
     with np.errstate(divide="ignore", invalid="ignore"):

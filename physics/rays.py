@@ -21,6 +21,9 @@ from .sphere import unit_vectors
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp] | slice
 
+# Energy at infinity, per energy in the FIDO's frame, that stands for none: its constants of motion stay finite.
+LEAST_ENERGY = 1e-12
+
 
 @dataclass(frozen=True)
 class Rays:
@@ -164,6 +167,29 @@ def light_in_fido_frame(observer: Observer, directions: Array, axes: Array) -> t
     return light, ahead
 
 
+def negative_energy_rays(spin: float, observer: Observer, directions: Array) -> Rays:
+    """Return the rays along `directions` that carry negative energy at infinity, as ordinary rays of a mirrored hole.
+
+    Reversing the energy and the spin together leaves r and theta of Eq. 2 as they are and reverses d phi / d zeta: such
+    a ray, traced backwards, runs as one of unit energy and the same b / |E| does about the hole of spin -a.
+
+    Returns
+    -------
+    Rays
+        Of spin -a and scaled to p_t = +1; `escapes` says which directions these are, and `one_plus_z` holds
+        -E / E_camera. Rays without any energy count as having the least.
+
+    Raises
+    ------
+    BlackHoleError
+        As for `rays_from_camera`.
+    """
+    spin = check_spin(spin)
+    metric = metric_functions(spin, observer.r, observer.theta)
+    light, doppler = light_in_fido_frame(observer, directions, camera_triad(observer))
+    return _rays_from_fido(spin, observer, metric, light, doppler, -1.0)
+
+
 def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
     """Return c_0 and c, shape (3,), with 1 + z = c_0 + c . N for every ray of the camera, N on (r, theta, phi)-hat.
 
@@ -186,12 +212,18 @@ def _rays_from_fido(
     metric: MetricFunctions,
     light: Array,
     doppler: Array,
+    sign: float = 1.0,
 ) -> Rays:
-    """Return the rays of light that runs along `light`, on the FIDO's triad, shape (3, n); `doppler` is Eq. 13's."""
+    """Return the rays of light that runs along `light`, on the FIDO's triad, shape (3, n); `doppler` is Eq. 13's.
+
+    Those whose energy at infinity has this `sign`, with p_t = -sign and the spin times it.
+    """
     n_r, n_theta, n_phi = light
     # Energy at infinity for unit energy in the FIDO's frame, 1/E_f of Eq. 7; inside the ergosphere it can
     # be zero or negative. It is also alpha / (1 - b omega), the second factor of Eq. 13.
-    energy = metric.alpha + metric.omega * metric.varpi * n_phi
+    energy = sign * (metric.alpha + metric.omega * metric.varpi * n_phi)
+    if sign < 0.0:
+        energy = np.where(energy >= 0.0, np.maximum(energy, LEAST_ENERGY), energy)
     escapes = energy > 0.0
     fido_energy = 1.0 / np.where(escapes, energy, np.nan)
     # varpi / sin(theta) = Sigma / rho is finite on the axis, where varpi and b vanish together (Eq. 8).
@@ -199,7 +231,7 @@ def _rays_from_fido(
     polar = fido_energy * metric.rho * n_theta
     a_cos = spin * math.cos(observer.theta)
     return Rays(
-        spin=spin,
+        spin=sign * spin,
         observer=observer,
         b=azimuthal * axis_safe_sin(observer.theta),
         carter=polar * polar + azimuthal * azimuthal - a_cos * a_cos,

@@ -148,7 +148,7 @@ def integrate(system: System, tableau: Tableau, tolerance: float, max_steps: int
         if not len(index):
             break
         step = system.limit(state, slope, step)
-        proposal, difference = _attempt(system, tableau, state, slope, step)
+        proposal, difference = attempt(system, tableau, state, slope, step)
         error = system.error(difference, state, slope) / tolerance
         accepted = error <= 1.0  # False for NaN
         factor = SAFETY * np.where(np.isfinite(error), np.maximum(error, 1e-12), np.inf) ** exponent
@@ -174,7 +174,7 @@ def integrate(system: System, tableau: Tableau, tolerance: float, max_steps: int
     yield Integration(final, reached & np.isfinite(final).all(axis=0))
 
 
-def _attempt(
+def attempt(
     system: System, tableau: Tableau, state: Array, slope: Array, step: Array
 ) -> tuple[Array, Array]:
     """Return the state after one step of `step` and its difference to the embedded solution."""

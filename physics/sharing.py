@@ -16,6 +16,7 @@ from collections.abc import Generator
 
 import numpy as np
 
+from .disk_pass import DiskPass
 from .painting import wrapped
 from .rays import Array
 from .shot import WarpMapParameters
@@ -95,8 +96,8 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
         None unless everything but the azimuth and the hole's orientation agrees to within half of the
         interpolation error that the parameters allow, which for `interpolation` 0 means exactly, and to a hundredth of
         a pixel, so that a slow pan of a long lens is not taken for a standstill. Directions are as
-        good as the earlier map's, visibility and redshift are its own. To keep errors from adding up over many
-        frames, always turn the same map.
+        good as the earlier map's, visibility and redshift are its own, and a disk's passes too but for their azimuth.
+        To keep errors from adding up over many frames, always turn the same map.
     """
     before = WarpMapParameters.from_metadata(earlier.metadata["parameters"])
     if _without_place(before) != _without_place(parameters):
@@ -114,7 +115,17 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     rotation = np.array(parameters.hole_to_world) @ about_axis @ np.array(before.hole_to_world).T
     counts = {**earlier.counts, "rays": 0, "shared": earlier.counts["rays"] + earlier.counts.get("shared", 0)}
     metadata = {**earlier.metadata, "hash": parameters.hash, "counts": counts, "parameters": parameters.to_metadata()}
-    return _rotated(earlier, rotation, metadata)
+    turned = _rotated(earlier, rotation, metadata)
+    passes = tuple(turned_pass(each, azimuth, metadata) for each in earlier.disk_passes)
+    return dataclasses.replace(turned, disk_passes=passes)
+
+
+def turned_pass(earlier: DiskPass, azimuth: float, metadata: dict[str, object]) -> DiskPass:
+    """Return a disk's pass for a camera whose azimuth is larger by `azimuth` radians; everything else stays."""
+    seen = earlier.coverage > 0.0
+    phi = earlier.phi.copy()
+    phi[seen] = wrapped((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))
+    return dataclasses.replace(earlier, phi=phi, metadata={**metadata, "crossing": earlier.metadata["crossing"]})
 
 
 def _without_place(parameters: WarpMapParameters) -> WarpMapParameters:

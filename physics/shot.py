@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .disk import Disk
 from .errors import BlackHoleError
 from .metric import check_spin, isco_radius, metric_functions
 from .observer import Observer
@@ -63,6 +64,8 @@ class WarpMapParameters:
         As for `trace_rays`.
     interpolation : float
         Error of direction allowed where neighbouring rays are interpolated, radians; 0 traces every pixel.
+    disk : Disk or None
+        A disk whose passes are baked along with the map.
     """
 
     spin: float
@@ -76,6 +79,7 @@ class WarpMapParameters:
     tolerance: float = DEFAULT_TOLERANCE
     method: str = DEFAULT_METHOD
     interpolation: float = DEFAULT_INTERPOLATION
+    disk: Disk | None = None
 
     def __post_init__(self) -> None:
         for name in ("camera_position", "velocity"):
@@ -104,6 +108,8 @@ class WarpMapParameters:
                 raise BlackHoleError(f"The matrix {name} is not a rotation.")
         metric_functions(self.spin, self.radius, 0.5)  # inside the horizon is the first thing to say
         self.observer()
+        if self.disk is not None:
+            self.disk.validate(self.spin, self.method)
 
     @property
     def radius(self) -> float:
@@ -167,6 +173,8 @@ class WarpMapParameters:
         """Return every parameter as plain JSON values."""
         values = asdict(self)
         values["camera"] = {"kind": self.camera.kind, **asdict(self.camera)}
+        if self.disk is None:
+            del values["disk"]  # maps without a disk keep the hash they had before there were disks
         plain: dict[str, Any] = json.loads(json.dumps(values))
         return plain
 
@@ -175,7 +183,8 @@ class WarpMapParameters:
         """Return the parameters that `to_metadata` was made from."""
         camera = dict(values["camera"])
         kind = {"perspective": PerspectiveCamera, "panorama": PanoramaCamera}[camera.pop("kind")]
-        return cls(**{**values, "camera": kind(**camera)})
+        disk = Disk(**values["disk"]) if values.get("disk") else None
+        return cls(**{**values, "camera": kind(**camera), "disk": disk})
 
 
 def looking_at_hole(position: Vector) -> Matrix:

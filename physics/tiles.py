@@ -104,6 +104,36 @@ _PLACES = _points(POINTS)
 _COEFFICIENTS = _to_coefficients(POINTS)
 
 
+def sample_places(tiles: Tiles, count: int = POINTS) -> tuple[Array, Array]:
+    """Return the pixel coordinates of the tiles' Chebyshev points, by tile, row and column, shape (n * count^2,)."""
+    places = chebyshev_places(count)
+    x = tiles.column[:, None, None] + tiles.side * places[None, None, :]
+    y = tiles.row[:, None, None] + tiles.side * places[None, :, None]
+    x, y = np.broadcast_arrays(x, y)
+    return x.ravel(), y.ravel()
+
+
+def chebyshev_places(count: int = POINTS) -> Array:
+    """Return where along a tile's side its points are, 0 to 1, shape (count,)."""
+    return _PLACES if count == POINTS else _points(count)
+
+
+def coefficients_of(values: Array) -> Array:
+    """Return the Chebyshev coefficients of samples by row and column, shape (..., count, count)."""
+    count = values.shape[-1]
+    matrix = _COEFFICIENTS if count == POINTS else _to_coefficients(count)
+    coefficients: Array = matrix @ values @ matrix.T
+    return coefficients
+
+
+def at_pixels(side: int, count: int = POINTS) -> tuple[Array, Array]:
+    """Return the Chebyshev polynomials and their slopes per pixel at a tile's pixel centres, shape (side, count)."""
+    angle = np.arccos(2.0 * (np.arange(side) + 0.5) / side - 1.0)[:, None]
+    order = np.arange(count)
+    # T_n' = n sin(n t) / sin(t), x = cos(t)
+    return _at_pixels(side, count), order * np.sin(order * angle) / np.sin(angle) * (2.0 / side)
+
+
 def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
     """Sample tiles and judge whether the samples determine them.
 
@@ -114,10 +144,7 @@ def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Arra
     good : ndarray of bool, shape (n,)
         Whether the interpolation's error is below `tolerance` radians; false where any sample sees no sky.
     """
-    x = tiles.column[:, None, None] + tiles.side * _PLACES[None, None, :]
-    y = tiles.row[:, None, None] + tiles.side * _PLACES[None, :, None]
-    x, y = np.broadcast_arrays(x, y)
-    values = directions(x.ravel(), y.ravel()).reshape(len(tiles), POINTS, POINTS, 3)
+    values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, 3)
     coefficients = _COEFFICIENTS @ np.moveaxis(values, -1, 1) @ _COEFFICIENTS.T
     size = np.abs(coefficients)
     rest = size[:, :, -TAIL:, :].sum(axis=(1, 2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(1, 2, 3))

@@ -6,9 +6,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .crossings import Crossings, LightAtDisk
+from .disk_tracer import disk_crossings
 from .observer import Observer
-from .rays import Array, Rays, light_in_fido_frame, rays_from_axes, rays_from_triad, redshift_vector
+from .rays import (
+    Array,
+    Rays,
+    camera_triad,
+    light_in_fido_frame,
+    rays_from_axes,
+    rays_from_triad,
+    redshift_vector,
+)
 from .shot import WarpMapParameters
 from .sphere import by_component, cos_sin, spherical_triad
 from .tracer import BLOCK_SIZE
@@ -65,6 +76,33 @@ class View:
         constant, vector = redshift_vector(self._spin, self._observer)
         along = self._camera.component(x * self._per_pixel, y * self._per_pixel, self._camera_to_triad @ vector)
         return constant + along
+
+    def crossings(
+        self,
+        x: Array,
+        y: Array,
+        count: int,
+        tolerance: float,
+        method: str,
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> tuple[Crossings, LightAtDisk]:
+        """Return the crossings of the equatorial plane at map pixel coordinates x, y, shape (n,), and the rays' light.
+
+        They go on smoothly beyond the rays' ends, see `crossings.Crossings`; for `wanted` see `disk_crossings`.
+        """
+        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        looking = seen @ self._camera_to_triad @ camera_triad(self._observer).T
+        return disk_crossings(
+            self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted
+        )
+
+    def places_in_plane(self, radii: Array, azimuths: Array) -> tuple[Array, Array]:
+        """Return map pixel coordinates where places in the equatorial plane would be seen in flat space, shape (n,)."""
+        r, theta, phi = self._observer.r, self._observer.theta, self._observer.phi
+        places = np.stack([radii * np.cos(azimuths), radii * np.sin(azimuths), np.zeros(len(radii))], axis=-1)
+        triad = spherical_triad(theta, phi)
+        looking = (places - r * triad[0]) @ triad.T
+        return self._pixels(looking / np.linalg.norm(looking, axis=-1, keepdims=True))
 
     def centre(self) -> tuple[float, float] | None:
         """Return the map pixel coordinates where the camera sees light that comes from the hole's direction."""

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .disk_painting import DiskPainting
+from .disk_pass import DiskPass
 from .painting import Painting
 from .shot import WarpMapParameters
 from .sky_table import SkyTable
@@ -32,6 +34,8 @@ class WarpMap:
     """Share of the pixel that sees the sky, 0 to 1."""
     metadata: dict[str, Any]
     """What the file's header says: ``format``, ``hash``, ``counts`` and ``parameters``."""
+    disk_passes: tuple[DiskPass, ...] = ()
+    """The disk's images, the first crossing first, where it was baked with a disk; they have files of their own."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -80,6 +84,14 @@ def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> 
     """
     parameters.validate()
     painting = Painting(parameters, table)
-    yield from painting.steps()
-    metadata = {"hash": parameters.hash, "counts": painting.counts(), "parameters": parameters.to_metadata()}
-    return WarpMap(*painting.planes, metadata)
+    metadata: dict[str, Any] = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
+    if parameters.disk is None:
+        yield from painting.steps()
+        return WarpMap(*painting.planes, {**metadata, "counts": painting.counts()})
+    for fraction in painting.steps():
+        yield 0.5 * fraction
+    disk = DiskPainting(parameters)
+    for fraction in disk.steps():
+        yield 0.5 + 0.5 * fraction
+    metadata["counts"] = {**painting.counts(), **disk.counts()}
+    return WarpMap(*painting.planes, metadata, disk.passes(metadata))

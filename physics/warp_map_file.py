@@ -50,14 +50,21 @@ def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
         path,
         dict(zip(CHANNELS, planes, strict=True)),
         {
-            ATTRIBUTE_FORMAT: f"{FORMAT} {FORMAT_VERSION}",
-            ATTRIBUTE_HASH: warp_map.metadata["hash"],
-            ATTRIBUTE_COUNTS: json.dumps(warp_map.metadata["counts"]),
-            ATTRIBUTE_PARAMETERS: json.dumps(warp_map.metadata["parameters"]),
-            ATTRIBUTE_CHECKSUM: _checksum(planes),
+            **map_header(f"{FORMAT} {FORMAT_VERSION}", warp_map.metadata, planes),
             "comments": "R, G: theta, phi of the light's origin in world axes (radians); B: 1 + z; A: sky visibility",
         },
     )
+
+
+def map_header(stamp: str, metadata: Mapping[str, Any], planes: Sequence[NDArray[Any]]) -> dict[str, str]:
+    """Return the header attributes of a map of any format: its stamp, what made it, and its pixels' checksum."""
+    return {
+        ATTRIBUTE_FORMAT: stamp,
+        ATTRIBUTE_HASH: metadata["hash"],
+        ATTRIBUTE_COUNTS: json.dumps(metadata["counts"]),
+        ATTRIBUTE_PARAMETERS: json.dumps(metadata["parameters"]),
+        ATTRIBUTE_CHECKSUM: _checksum(planes),
+    }
 
 
 def read_warp_map(path: PathLike) -> WarpMap:
@@ -73,17 +80,30 @@ def read_warp_map(path: PathLike) -> WarpMap:
     WarpMapError
         When the file is missing, damaged, cut short, or not a warp map; the message names it and says which.
     """
+    (theta, phi, one_plus_z, visibility), metadata, _ = read_map(path, FORMAT, FORMAT_VERSION)
+    _check_ranges(path, theta, phi, one_plus_z, visibility)
+    return WarpMap(theta, phi, one_plus_z, visibility, metadata)
+
+
+def read_map(
+    path: PathLike, kind: str, version: int
+) -> tuple[list[NDArray[np.float32]], dict[str, Any], dict[str, Any]]:
+    """Read a map of any format: its four channels, found to be as they were written, its metadata, and its header.
+
+    Raises
+    ------
+    WarpMapError
+        When the file is missing, damaged, cut short, or of another format or version.
+    """
     try:
         channels, header = read_channels(path)
     except ImageFileError as error:
         raise WarpMapError(_advice(str(error))) from error
-    metadata = _metadata(path, header)
+    metadata = map_metadata(path, header, kind, version)
     planes = [channels[name] for name in CHANNELS if name in channels]
     if len(planes) != len(CHANNELS) or _checksum(planes) != header.get(ATTRIBUTE_CHECKSUM):
         raise WarpMapError(_advice(f"{path} is damaged: its pixels are not those that were written."))
-    theta, phi, one_plus_z, visibility = planes
-    _check_ranges(path, theta, phi, one_plus_z, visibility)
-    return WarpMap(theta, phi, one_plus_z, visibility, metadata)
+    return planes, metadata, header
 
 
 def read_warp_map_metadata(path: PathLike) -> dict[str, Any]:
@@ -98,15 +118,22 @@ def read_warp_map_metadata(path: PathLike) -> dict[str, Any]:
         header = read_exr_header(path)
     except ImageFileError as error:
         raise WarpMapError(_advice(str(error))) from error
-    return _metadata(path, header)
+    return map_metadata(path, header, FORMAT, FORMAT_VERSION)
 
 
-def _metadata(path: PathLike, header: Mapping[str, Any]) -> dict[str, Any]:
-    stamp = header.get(ATTRIBUTE_FORMAT)
-    if not isinstance(stamp, str) or not stamp.startswith(FORMAT + " "):
-        raise WarpMapError(_advice(f"{Path(path)} is not a warp map."))
-    if stamp != f"{FORMAT} {FORMAT_VERSION}":
-        raise WarpMapError(_advice(f"{Path(path)} is a warp map of another version ({stamp})."))
+def map_metadata(path: PathLike, header: Mapping[str, Any], kind: str, version: int) -> dict[str, Any]:
+    """Return the metadata in the header of a map of the format `kind`, which is "umbra" and what it is called.
+
+    Raises
+    ------
+    WarpMapError
+        For a header of another format or version, or one that cannot be read.
+    """
+    stamp, noun = header.get(ATTRIBUTE_FORMAT), kind.removeprefix("umbra ")
+    if not isinstance(stamp, str) or not stamp.startswith(kind + " "):
+        raise WarpMapError(_advice(f"{Path(path)} is not a {noun}."))
+    if stamp != f"{kind} {version}":
+        raise WarpMapError(_advice(f"{Path(path)} is a {noun} of another version ({stamp})."))
     try:
         parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
         counts = json.loads(header[ATTRIBUTE_COUNTS])

@@ -24,8 +24,8 @@ class ReferenceCamera:
     rows: dict[str, np.ndarray]
 
 
-def reference_cameras() -> Iterator[ReferenceCamera]:
-    with np.load(DATA / "reference_rays.npz") as archive:
+def reference_cameras(file: str = "reference_rays.npz") -> Iterator[ReferenceCamera]:
+    with np.load(DATA / file) as archive:
         table = {key: archive[key] for key in archive.files}
     for name in dict.fromkeys(table["name"].tolist()):
         rows = {key: column[table["name"] == name] for key, column in table.items()}

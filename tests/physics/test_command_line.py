@@ -138,3 +138,48 @@ def test_unstable_orbit_and_odd_sky_are_noted(baked, tmp_path):
     square = tmp_path / "square.exr"
     write_exr(square, np.zeros((8, 8, 3), np.float32))
     assert "panorama?" in run("render", baked, square, tmp_path / "a.png").stderr
+
+
+def test_a_disk_is_baked_beside_the_map_and_drawn(tmp_path, sky):
+    path, picture = tmp_path / "map.exr", tmp_path / "picture.exr"
+    small = ("--width", 64, "--height", 36, "--radius", 40, "--fov", 40)
+    result = run("bake", path, *small, "--disk", "--disk-crossings", 2, "--disk-outer", 15)
+    assert result.returncode == 0, result.stderr
+    assert f"wrote {tmp_path / 'map_disk2.exr'}" in result.stdout
+    result = run("render", path, sky, picture, "--disk", "--disk-look", "gargantua", "--disk-time", 10)
+    assert result.returncode == 0, result.stderr
+    plain = tmp_path / "plain.exr"
+    assert run("render", path, sky, plain).returncode == 0
+    assert not np.array_equal(read_exr(picture)[0], read_exr(plain)[0])
+    # A pass of another bake is refused, and so is one that is missing.
+    other = tmp_path / "other.exr"
+    assert run("bake", other, *small, "--disk", "--disk-crossings", 2).returncode == 0
+    (tmp_path / "other_disk1.exr").replace(tmp_path / "map_disk1.exr")
+    result = run("render", path, sky, picture, "--disk")
+    assert (result.returncode, "does not belong to" in result.stderr) == (1, True)
+    (tmp_path / "map_disk1.exr").unlink()
+    result = run("render", path, sky, picture, "--disk")
+    assert (result.returncode, "map_disk1.exr does not exist" in result.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--disk-outer", 9), "add --disk"),
+        (("--disk", "--disk-outer", 1), "outer radius"),
+        (("--disk", "--disk-inner", 0.1), "inner radius"),
+        (("--disk", "--disk-crossings", 99), "crossings"),
+        (("--disk", "--method", "cash-karp-printed"), "knows no disk"),
+    ],
+)
+def test_impossible_disks_are_refused_in_one_sentence(tmp_path, arguments, words):
+    result = run("bake", tmp_path / "map.exr", *arguments)
+    assert result.returncode == 1
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_map_without_a_disk_has_none_to_draw(baked, sky, tmp_path):
+    result = run("render", baked, sky, tmp_path / "picture.png", "--disk")
+    assert (result.returncode, "baked without a disk" in result.stderr) == (1, True)

@@ -12,6 +12,7 @@ from shots import shot
 from physics import (
     BlackHoleError,
     Cancelled,
+    Disk,
     Fate,
     PanoramaCamera,
     PerspectiveCamera,
@@ -207,6 +208,7 @@ def test_hash_holds_exactly_while_nothing_changes():
         "tolerance": 1e-7,
         "method": "cash-karp-printed",
         "interpolation": 0.0,
+        "disk": Disk(),
     }
     assert set(changes) == {field.name for field in dataclasses.fields(WarpMapParameters)}
     hashes = {dataclasses.replace(base, **{name: value}).hash for name, value in changes.items()}

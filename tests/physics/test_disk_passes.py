@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A disk's passes: interpolated against traced, coverage against counting, files, and sharing between frames."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from shots import AWAY, shot
+
+from physics import (
+    BlackHoleError,
+    Disk,
+    PanoramaCamera,
+    WarpMapError,
+    WarpMapParameters,
+    bake,
+    read_disk_pass,
+    read_warp_map,
+    turned_map,
+    write_disk_pass,
+    write_warp_map,
+)
+from physics.annulus import share_above
+from physics.view import View
+
+DISK = Disk()
+SHOTS = {
+    "ordinary": shot(160, 90, radius=30.0, motion="fido", spin=0.9, disk=DISK),
+    "over the pole": shot(160, 90, radius=30.0, inclination=0.0, motion="fido", spin=0.9, disk=DISK),
+    "inside the photon orbits": shot(
+        camera=PanoramaCamera(128, 64), camera_position=(2.2, 0.5, 0.3), motion="fido", spin=0.9, disk=DISK
+    ),
+    "narrow lens": shot(160, 90, fov=5.0, radius=60.0, motion="fido", disk=DISK),
+    "wide lens": shot(160, 90, fov=160.0, radius=6.0, disk=DISK),
+    "whole sky": shot(camera=PanoramaCamera(160, 80), radius=12.0, spin=0.5, disk=DISK),
+    "extreme spin, matter that falls": shot(
+        160, 90, spin=0.9999, radius=8.0, motion="fido", disk=Disk(inner_radius=1.03, outer_radius=6.0, crossings=2)
+    ),
+    "close to the plane": shot(160, 90, radius=40.0, inclination=89.5, motion="fido", spin=0.3, disk=DISK),
+    "within the disk's plane": shot(160, 90, radius=40.0, inclination=90.0, motion="fido", spin=0.3, disk=DISK),
+    "far away, retrograde": shot(160, 90, radius=500.0, fov=8.0, disk=Disk(retrograde=True)),
+    "looking away from above the disk": shot(
+        160, 90, camera_position=(10.0, 0.0, 1.0), camera_to_hole=AWAY, motion="fido", spin=0.9, disk=DISK
+    ),
+}
+# Places inside a pixel whose mean is the coverage, for the check.
+PLACES = 8
+
+
+def counted_coverage(parameters, columns, rows):
+    """Share of places in each pixel whose ray crosses the disk, (crossings, n), and radii there."""
+    view = View(parameters)
+    steps = (np.arange(PLACES) + 0.5) / PLACES
+    x = (columns[:, None, None] + steps).repeat(PLACES, axis=1)
+    y = (rows[:, None, None] + steps[:, None]).repeat(PLACES, axis=2)
+    found, _ = view.crossings(x.ravel(), y.ravel(), parameters.disk.crossings, 1e-8, "gauss-legendre")
+    inner, outer = parameters.disk.radii(parameters.spin)
+    inside = (found.u >= 1.0 / outer) & (found.u <= 1.0 / inner)
+    return inside.reshape(len(inside), -1, PLACES * PLACES).mean(axis=-1)
+
+
+@pytest.mark.parametrize("name", SHOTS)
+def test_passes_are_those_of_rays_traced_everywhere(name):
+    parameters = SHOTS[name]
+    passes = bake(parameters).disk_passes
+    assert len(passes) == parameters.disk.crossings
+    random = np.random.default_rng(1)
+    width, height = parameters.map_size
+    columns, rows = random.integers(0, width, 1500), random.integers(0, height, 1500)
+    counted = counted_coverage(parameters, columns, rows)
+    inner, outer = parameters.disk.radii(parameters.spin)
+    centre, light = View(parameters).crossings(
+        columns + 0.5, rows + 0.5, parameters.disk.crossings, 1e-9, "gauss-legendre"
+    )
+    g = light.g(parameters.spin, centre.u, centre.u_slope, parameters.disk.retrograde)
+    assert (passes[0].coverage > 0.0).any()
+    for order, one in enumerate(passes):
+        share = one.coverage[rows, columns]
+        # 64 places know a straight rim to 2 %, and the images are crowded next to the shadow.
+        error = np.abs(share - counted[order])
+        assert error.mean() < 0.004
+        assert np.quantile(error, 0.99) < 0.15
+        assert error.max() < 0.6
+        seen = one.coverage > 0.0
+        assert ((one.radius[seen] >= inner * (1 - 1e-6)) & (one.radius[seen] <= outer * (1 + 1e-6))).all()
+        assert (one.g[seen] > 0.0).all()
+        whole = (share == 1.0) & (counted[order] == 1.0)
+        if whole.sum() > 20:
+            radius = np.abs(one.radius[rows, columns] * centre.u[order] - 1.0)[whole]
+            turn = np.abs((one.phi[rows, columns] - centre.phi[order] + math.pi) % (2 * math.pi) - math.pi)[whole]
+            shift = np.abs(one.g[rows, columns] / g[order] - 1.0)[whole]
+            # 2e-4 is promised where the image is not crowded.
+            assert np.median(radius) < 2e-4
+            assert np.median(turn) < 2e-4
+            assert np.median(shift) < 2e-4
+            assert np.quantile(radius, 0.95) < 0.01
+
+
+def test_interpolation_traces_few_rays_of_a_large_picture():
+    parameters = shot(960, 540, radius=30.0, motion="fido", spin=0.5, disk=Disk(crossings=1))
+    assert bake(parameters).counts["disk_rays"] < 0.25 * 960 * 540
+
+
+def test_tracing_every_pixel_gives_the_same():
+    parameters = SHOTS["ordinary"]
+    adaptive, every = bake(parameters), bake(dataclasses.replace(parameters, interpolation=0.0))
+    for one, other in zip(adaptive.disk_passes, every.disk_passes, strict=True):
+        assert np.abs(one.coverage - other.coverage).mean() < 1e-3
+        both = (one.coverage == 1.0) & (other.coverage == 1.0)
+        if both.any():
+            assert np.quantile(np.abs(one.radius / np.where(both, other.radius, 1.0) - 1.0)[both], 0.99) < 2e-3
+
+
+def test_passes_traced_by_steps_are_the_same():
+    parameters = shot(32, 18, radius=30.0, fov=50.0, motion="fido", spin=0.9, disk=Disk(crossings=2))
+    by_steps = bake(dataclasses.replace(parameters, method="cash-karp", interpolation=0.0))
+    assert by_steps.counts["disk_unresolved"] == 0
+    for one, other in zip(bake(parameters).disk_passes, by_steps.disk_passes, strict=True):
+        assert one.coverage == pytest.approx(other.coverage, abs=1e-3)
+        assert one.radius == pytest.approx(other.radius, rel=1e-3)
+
+
+def test_the_share_of_a_square_above_a_plane():
+    random = np.random.default_rng(0)
+    x, y = np.meshgrid((np.arange(200) + 0.5) / 200 - 0.5, (np.arange(200) + 0.5) / 200 - 0.5)
+    for _ in range(30):
+        height, across, down = random.normal(0.0, (0.5, 1.0, 1.0))
+        assert share_above(height, across, down) == pytest.approx((height + across * x + down * y > 0).mean(), abs=0.01)
+    assert share_above(np.array([1.0, -1.0, 0.0]), 0.0, 0.0) == pytest.approx([1.0, 0.0, 0.5])
+    assert share_above(np.array(0.25), np.array(1.0), np.array(0.0)) == pytest.approx(0.75, abs=1e-4)
+
+
+def test_a_map_without_a_disk_is_what_it_was():
+    plain = shot()
+    assert "disk" not in plain.to_metadata()
+    assert bake(plain).disk_passes == ()
+    assert WarpMapParameters.from_metadata(plain.to_metadata()) == plain
+    with_disk = shot(disk=DISK)
+    assert with_disk.hash != plain.hash
+    assert WarpMapParameters.from_metadata(with_disk.to_metadata()) == with_disk
+    assert np.array_equal(bake(plain).theta, bake(with_disk).theta)
+
+
+def test_impossible_disks_are_refused():
+    for disk, words in (
+        (Disk(inner_radius=0.5), "horizon"),
+        (Disk(inner_radius=9.0, outer_radius=5.0), "outer radius"),
+        (Disk(outer_radius=math.inf), "outer radius"),
+        (Disk(crossings=0), "crossings"),
+    ):
+        with pytest.raises(BlackHoleError, match=words):
+            bake(shot(disk=disk))
+    with pytest.raises(BlackHoleError, match="knows no disk"):
+        bake(shot(disk=DISK, method="cash-karp-printed"))
+
+
+def test_a_pass_survives_its_file(tmp_path):
+    baked = bake(shot(disk=DISK))
+    for one in baked.disk_passes:
+        path = tmp_path / f"{one.metadata['crossing']}.exr"
+        write_disk_pass(path, one)
+        read = read_disk_pass(path)
+        for name in ("radius", "phi", "g", "coverage"):
+            assert np.array_equal(getattr(read, name), getattr(one, name))
+        assert read.metadata["crossing"] == one.metadata["crossing"]
+        assert read.metadata["parameters"] == one.metadata["parameters"]
+    with pytest.raises(WarpMapError, match="not a warp map"):
+        read_warp_map(path)
+    write_warp_map(tmp_path / "map.exr", baked)
+    with pytest.raises(WarpMapError, match="not a disk pass"):
+        read_disk_pass(tmp_path / "map.exr")
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(WarpMapError, match="bake it again"):
+        read_disk_pass(path)
+
+
+def test_frames_of_an_orbit_share_passes():
+    first = shot(96, 54, radius=25.0, motion="fido", spin=0.7, disk=Disk(crossings=2))
+    angle = 0.7
+    x, _, z = first.camera_position
+    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    later = dataclasses.replace(
+        first,
+        camera_position=tuple(turn @ [x, 0.0, z]),
+        camera_to_hole=tuple(map(tuple, turn @ np.array(first.camera_to_hole))),
+    )
+    shared, baked = turned_map(bake(first), later), bake(later)
+    assert shared is not None
+    for one, other in zip(shared.disk_passes, baked.disk_passes, strict=True):
+        assert np.abs(one.coverage - other.coverage).max() < 0.05
+        both = (one.coverage == 1.0) & (other.coverage == 1.0)
+        turned = np.abs((one.phi - other.phi + math.pi) % (2 * math.pi) - math.pi)[both]
+        assert np.quantile(turned, 0.99) < 1e-3
+        assert one.metadata["hash"] == later.hash
+
+
+def test_negative_energies_have_their_redshift():
+    """In the ergosphere the disk is seen along rays of negative energy too, with g > 0."""
+    parameters = shot(
+        camera=PanoramaCamera(64, 32), camera_position=(1.3, 0.0, 0.05), motion="fido", spin=0.9999,
+        disk=Disk(crossings=1, inner_radius=1.02),
+    )
+    view = View(parameters)
+    x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(32) + 0.5)
+    _, light = view.crossings(x.ravel(), y.ravel(), 1, 1e-6, "gauss-legendre")
+    negative = (light.energy < 0.0).reshape(32, 64)
+    (one,) = bake(parameters).disk_passes
+    seen = negative & (one.coverage > 0.0)
+    assert seen.any()
+    assert (one.g[seen] > 0.0).all()
