@@ -11,8 +11,8 @@ from pathlib import Path
 
 import bpy
 
-from . import maps, shot, sync
-from ._physics import physics
+from . import lens_sync, maps, shot, sync
+from ._physics import exit_map, exit_map_file, physics
 from .compositor_tree import find_setup
 from .errors import SceneError
 
@@ -62,8 +62,8 @@ def _count(number: int, noun: str) -> str:
 
 def bake_map(
     path: Path, parameters: "physics.WarpMapParameters"
-) -> Generator[float, None, "physics.WarpMap"]:
-    """Bake one map into a file; yields the fraction done, and returns the map.
+) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
+    """Bake one map, of the kind that its path says, into a file; yields the fraction done, and returns the map.
 
     It is traced, or made from the map that was traced last where only the camera's azimuth differs.
 
@@ -74,6 +74,8 @@ def bake_map(
     """
     global _traced
     maps.prepare(path, parameters.map_size)
+    if maps.kind_of(path) is maps.EXIT_MAP:
+        return (yield from _bake_exit_map(path, parameters))
     warp_map = None if _traced is None else physics.turned_map(_traced, parameters)
     if warp_map is None:
         warp_map = yield from physics.bake_steps(parameters)
@@ -82,14 +84,53 @@ def bake_map(
     return warp_map
 
 
+def _bake_exit_map(
+    path: Path, parameters: "physics.WarpMapParameters"
+) -> Generator[float, None, "exit_map.ExitMap"]:
+    baked = yield from exit_map.bake_exit_map_steps(parameters)
+    exit_map_file.write_exit_map(path, baked)
+    for older in maps.older_exit_maps(path):
+        older.unlink(missing_ok=True)
+    return baked
+
+
+def provide_map(
+    scene: bpy.types.Scene, path: Path, parameters: "physics.WarpMapParameters", frame: int
+) -> None:
+    """Make sure, for a render, that a frame's map holds.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        It does not, and may not or cannot be baked.
+    """
+    fault = maps.fault_of(path, parameters)
+    if fault is None:
+        return
+    if not scene.umbra.auto_bake:
+        raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
+    where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
+    print(f"Umbra: baking the {maps.kind_of(path).noun} of frame {frame}{where}", flush=True)
+    for _fraction in bake_map(path, parameters):
+        pass
+
+
 def forget_traced_map() -> None:
     """Free the memory of the map that was traced last, when a bake or a render is over."""
     global _traced
     _traced = None
 
 
+def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.WarpMapParameters":
+    """What the map of a shot is made from, for the scene's output."""
+    parameters = frame_shot.parameters
+    return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
+
+
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     """Where the map of a shot lies, or will lie."""
+    if lens_sync.is_on(scene):
+        return maps.exit_map_path(scene, frame_shot.hole_name, parameters_of(scene, frame_shot), frame_shot.frame)
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
 
 
@@ -125,13 +166,14 @@ def bake_frames(
         try:
             layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
             frame_shot = shot.read_at(scene, frame, layer)
+            parameters = parameters_of(scene, frame_shot)
             path = path_of(scene, frame_shot)
             summary.folder = maps.folder(scene)
             yield Progress(frame, index / len(wanted), text)
-            if maps.is_fresh(path, frame_shot.parameters):
+            if maps.is_fresh(path, parameters):
                 summary.reused.append(frame)
                 continue
-            steps = bake_map(path, frame_shot.parameters)
+            steps = bake_map(path, parameters)
             while True:
                 try:
                     fraction = next(steps)

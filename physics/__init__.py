@@ -7,6 +7,7 @@ from .observer import Observer
 from .sharing import turned_map
 from .shot import (
     DEFAULT_INTERPOLATION,
+    IDENTITY,
     MOTIONS,
     SUPERSAMPLING,
     WarpMapParameters,
@@ -21,6 +22,7 @@ __all__ = [
     "DEFAULT_INTERPOLATION",
     "DEFAULT_METHOD",
     "DEFAULT_TOLERANCE",
+    "IDENTITY",
     "METHODS",
     "MOTIONS",
     "SUPERSAMPLING",
