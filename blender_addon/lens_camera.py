@@ -69,7 +69,8 @@ def restore(camera: bpy.types.Camera) -> None:
     for name, value in before["parameters"].items():
         camera.cycles_custom[name] = value
     # Setting any of these makes Blender compile the shader again, also with the value that is there.
-    for name, value in {**{each: before[each] for each in _REMEMBERED}, "custom_shader": camera.get(SHADER_BEFORE)}.items():
+    wanted = {name: before[name] for name in _REMEMBERED} | {"custom_shader": camera.get(SHADER_BEFORE)}
+    for name, value in wanted.items():
         if getattr(camera, name) != value:
             setattr(camera, name, value)
     if kept_type is not None:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import baking, lens_objects, lens_shader, lens_sync, maps, messages, shot
+from . import baking, foreground, lens_objects, lens_shader, lens_sync, messages, shot
 from .errors import SceneError
 
 # The devices of scenes that are rendered on the CPU in place of a GPU, to be set back.
@@ -26,6 +26,7 @@ def begin(scene: bpy.types.Scene) -> None:
         messages.warn(f"{problem} This render is made on the CPU.")
         _devices[scene.name] = scene.cycles.device
         scene.cycles.device = "CPU"
+    foreground.refresh(scene)
 
 
 def end(scene: bpy.types.Scene) -> None:
@@ -51,6 +52,8 @@ def provide(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.
     """
     for warning in lens_objects.warnings(scene, depsgraph, frame):
         messages.warn(warning)
+    if scene.umbra.foreground_scene is not None:
+        foreground.copy_lens(scene.umbra.foreground_scene, scene.camera.evaluated_get(depsgraph).data)
     if not lens_sync.uses_maps(scene):
         lens_sync.show(scene, frame)
         return

@@ -35,7 +35,7 @@ def bytecode(*, uses_map: bool) -> tuple[str, str]:
     try:
         import _cycles
     except ImportError:
-        raise SceneError("Cycles is not available: enable it in Preferences > Add-ons, or use the compositor.") from None
+        raise SceneError("Cycles is not available: enable it in Preferences > Add-ons.") from None
     if not _cycles.with_osl:
         raise SceneError(
             "This Blender was built without Open Shading Language, which the Cycles Lens needs: use an official build, "

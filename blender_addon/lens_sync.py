@@ -72,7 +72,7 @@ def check(scene: bpy.types.Scene) -> None:
     """
     if scene.render.engine != "CYCLES":
         raise SceneError(
-            "The Cycles Lens needs the render engine Cycles: choose it in Render Properties, or choose Output: Compositor."
+            "The Cycles Lens needs the render engine Cycles: choose it in Render Properties, or Output: Compositor."
         )
 
 

@@ -161,7 +161,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         name="Rays",
         description="Where the camera takes its bent rays from when rendering",
         items=(
-            (EXIT_MAP, "Exit Map", "From a baked map, at the speed of a plain camera; beside the shadow they are traced"),
+            (EXIT_MAP, "Exit Map", "From a baked map, as fast as a plain camera; beside the shadow they are traced"),
             (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render"),
         ),
         default=EXIT_MAP,
@@ -209,6 +209,11 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         name="Foreground",
         description="Collection of the objects that are shown unlensed in front of the hole",
         type=bpy.types.Collection,
+    )
+    foreground_scene: bpy.props.PointerProperty(
+        name="Foreground Scene",
+        description="Scene of the unbent camera that renders the foreground",
+        type=bpy.types.Scene,
     )
     cpu_fallback: bpy.props.BoolProperty(
         name="CPU if the GPU Cannot",

@@ -20,8 +20,8 @@ from .errors import BlackHoleError
 from .polar import PolarMotion
 from .quadrature import direct_integrals, turning_integrals
 from .rays import Array, Rays
-from .runge_kutta import CASH_KARP, Integration, integrate
-from .tracer import DEFAULT_MAX_STEPS, Fate, mino_systems
+from .runge_kutta import CASH_KARP, integrate
+from .tracer import DEFAULT_MAX_STEPS, Fate, last, mino_systems
 from .trapped import Barrier, comes_from_sky, find_barrier
 
 # Methods whose equations carry n' along; the form of Eq. 2 as printed does not.
@@ -110,10 +110,7 @@ def _by_steps(
     for indices, system in mino_systems(rays, barrier, tolerance):
         if not len(indices):
             continue
-        outcome: Integration | None = None
-        for outcome in integrate(system, CASH_KARP, tolerance, DEFAULT_MAX_STEPS):
-            pass
-        assert outcome is not None
+        outcome = last(integrate(system, CASH_KARP, tolerance, DEFAULT_MAX_STEPS))
         reached = outcome.reached
         unit, rate = system.select(reached).exit_lines(outcome.state[:, reached])
         direction[place[indices[reached]]], impact[place[indices[reached]]] = unit, -rate

@@ -131,7 +131,8 @@ class ExitPainting(Painting):
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         for i in range(len(tiles)):
-            place = (slice(tiles.row[i], tiles.row[i] + tiles.side), slice(tiles.column[i], tiles.column[i] + tiles.side))
+            top, left = tiles.row[i], tiles.column[i]
+            place = (slice(top, top + tiles.side), slice(left, left + tiles.side))
             height, width = self._one_plus_z[place].shape
             self._lines[place] = lines[i, :height, :width]
             self._one_plus_z[place] = one_plus_z[i, :height, :width]

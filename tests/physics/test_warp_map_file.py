@@ -16,9 +16,9 @@ from physics import (
     WarpMapError,
     WarpMapParameters,
     bake,
+    map_file,
     read_warp_map,
     read_warp_map_metadata,
-    warp_map_file,
     write_warp_map,
 )
 from physics.exr import read_exr, read_exr_header, write_exr
