@@ -26,7 +26,6 @@ def begin(scene: bpy.types.Scene) -> None:
         messages.warn(f"{problem} This render is made on the CPU.")
         _devices[scene.name] = scene.cycles.device
         scene.cycles.device = "CPU"
-    foreground.refresh(scene)
 
 
 def end(scene: bpy.types.Scene) -> None:

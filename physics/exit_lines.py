@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import BlackHoleError
+from .mino import MinoSystem
 from .polar import PolarMotion
 from .quadrature import direct_integrals, turning_integrals
 from .rays import Array, Rays
@@ -108,7 +109,7 @@ def _by_steps(
     """Fill the rows `place` by Cash-Karp steps; return which rays were given up, shape (n,)."""
     lost = np.zeros(len(rays), dtype=bool)
     for indices, system in mino_systems(rays, barrier, tolerance):
-        if not len(indices):
+        if not len(indices) or not isinstance(system, MinoSystem):
             continue
         outcome = last(integrate(system, CASH_KARP, tolerance, DEFAULT_MAX_STEPS))
         reached = outcome.reached

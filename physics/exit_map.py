@@ -151,7 +151,7 @@ class ExitPainting(Painting):
     def _trace_pixels(self, columns: NDArray[np.intp], rows: NDArray[np.intp]) -> None:
         for start in range(0, len(columns), BLOCK_SIZE):
             place = (rows[start : start + BLOCK_SIZE], columns[start : start + BLOCK_SIZE])
-            x, y = place[1] + 0.5, place[0] + 0.5
+            x, y = (each.astype(np.float64) + 0.5 for each in (place[1], place[0]))
             fate, self._lines[place] = self._exits(x, y)
             self._unresolved += int(np.count_nonzero(fate == Fate.UNRESOLVED))
             self._one_plus_z[place] = np.where(fate == Fate.SKY, self._view.one_plus_z(x, y), 1.0)
