@@ -10,9 +10,9 @@ import importlib.util
 
 if importlib.util.find_spec(f"{__package__}.physics") is not None:
     from . import physics
-    from .physics import colour, exr, metric, reference_render, star_sky
+    from .physics import colour, exit_map, exit_map_file, exr, lens, metric, reference_render, star_sky
 else:
     import physics  # type: ignore[no-redef]
-    from physics import colour, exr, metric, reference_render, star_sky  # type: ignore[no-redef]
+    from physics import colour, exit_map, exit_map_file, exr, lens, metric, reference_render, star_sky  # type: ignore[no-redef]
 
-__all__ = ["colour", "exr", "metric", "physics", "reference_render", "star_sky"]
+__all__ = ["colour", "exit_map", "exit_map_file", "exr", "lens", "metric", "physics", "reference_render", "star_sky"]

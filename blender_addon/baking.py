@@ -13,8 +13,8 @@ from pathlib import Path
 
 import bpy
 
-from . import maps, shot, sync
-from ._physics import physics
+from . import lens_sync, maps, shot, sync
+from ._physics import exit_map, exit_map_file, physics
 from .compositor_tree import find_setup
 from .errors import SceneError
 
@@ -66,18 +66,37 @@ def _count(number: int, noun: str) -> str:
 
 def bake_map(
     path: Path, parameters: "physics.WarpMapParameters"
-) -> Generator[float, None, "physics.WarpMap"]:
-    """Bake one map into a file; yields the fraction done, and returns the map.
+) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
+    """Bake one map, of the kind that its path says, into a file; yields the fraction done, and returns the map.
 
     Raises
     ------
     physics.BlackHoleError
         The parameters are impossible, or the file cannot be written.
     """
+    baked = yield from _steps(path, parameters)
+    _save(path, baked)
+    return baked
+
+
+def _steps(
+    path: Path, parameters: "physics.WarpMapParameters"
+) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
+    """Bake a map of the kind that its path says, once it is sure that it can be written."""
     maps.prepare(path, parameters.map_size)
-    warp_map = yield from _baker.steps(parameters)
-    physics.write_warp_map(path, warp_map)
-    return warp_map
+    if maps.kind_of(path) is maps.EXIT_MAP:
+        return (yield from exit_map.bake_exit_map_steps(parameters))
+    return (yield from _baker.steps(parameters))
+
+
+def _save(path: Path, baked: "physics.WarpMap | exit_map.ExitMap") -> None:
+    """Write a map of either kind; this may run in a thread of its own, and touches nothing of Blender's."""
+    if not isinstance(baked, exit_map.ExitMap):
+        physics.write_warp_map(path, baked)
+        return
+    exit_map_file.write_exit_map(path, baked)
+    for older in maps.older_exit_maps(path):
+        older.unlink(missing_ok=True)
 
 
 def forget_shared_rays() -> None:
@@ -86,8 +105,37 @@ def forget_shared_rays() -> None:
     _baker = physics.MapBaker()
 
 
+def provide_map(
+    scene: bpy.types.Scene, path: Path, parameters: "physics.WarpMapParameters", frame: int
+) -> None:
+    """Make sure, for a render, that a frame's map holds.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        It does not, and may not or cannot be baked.
+    """
+    fault = maps.fault_of(path, parameters)
+    if fault is None:
+        return
+    if not scene.umbra.auto_bake:
+        raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
+    where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
+    print(f"Umbra: baking the {maps.kind_of(path).noun} of frame {frame}{where}", flush=True)
+    for _fraction in bake_map(path, parameters):
+        pass
+
+
+def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.WarpMapParameters":
+    """What the map of a shot is made from, for the scene's output."""
+    parameters = frame_shot.parameters
+    return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
+
+
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     """Where the map of a shot lies, or will lie."""
+    if lens_sync.is_on(scene):
+        return maps.exit_map_path(scene, frame_shot.hole_name, parameters_of(scene, frame_shot), frame_shot.frame)
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
 
 
@@ -124,25 +172,25 @@ def bake_frames(
             with _naming(frame, len(wanted)):
                 layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
                 frame_shot = shot.read_at(scene, frame, layer)
+                parameters = parameters_of(scene, frame_shot)
                 path = path_of(scene, frame_shot)
                 summary.folder = maps.folder(scene)
                 yield Progress(frame, index / len(wanted), text)
-                if maps.is_fresh(path, frame_shot.parameters):
+                if maps.is_fresh(path, parameters):
                     summary.reused.append(frame)
                     continue
-                maps.prepare(path, frame_shot.parameters.map_size)
-                steps = _baker.steps(frame_shot.parameters)
+                steps = _steps(path, parameters)
                 while True:
                     try:
                         fraction = next(steps)
                     except StopIteration as end:
-                        warp_map = end.value
+                        baked = end.value
                         break
                     yield Progress(frame, (index + fraction) / len(wanted), text)
-            summary.unresolved += warp_map.counts.get("unresolved", 0)
+            summary.unresolved += baked.counts.get("unresolved", 0)
             while not writing.wait(WAIT):
                 yield Progress(frame, (index + 1) / len(wanted), text)
-            writing.start(functools.partial(_write, path, warp_map, frame, len(wanted)))
+            writing.start(functools.partial(_write, path, baked, frame, len(wanted)))
             summary.baked.append(frame)
         while not writing.wait(WAIT):
             yield Progress(wanted[-1], 1.0, "Writing")
@@ -162,9 +210,9 @@ def _naming(frame: int, count: int) -> Iterator[None]:
         raise SceneError(prefix + str(error)) from error
 
 
-def _write(path: Path, warp_map: "physics.WarpMap", frame: int, count: int) -> None:
+def _write(path: Path, baked: "physics.WarpMap | exit_map.ExitMap", frame: int, count: int) -> None:
     with _naming(frame, count):
-        physics.write_warp_map(path, warp_map)
+        _save(path, baked)
 
 
 def finish(scene_name: str) -> None:

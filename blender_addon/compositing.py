@@ -36,7 +36,8 @@ _RENDER_SETTINGS = {
 }
 
 
-def _output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """The node whose first input is the picture that is given out."""
     kind = "COMPOSITE" if has_scene_tree() else "GROUP_OUTPUT"
     outputs = [node for node in tree.nodes if node.type == kind]
     if not has_scene_tree():
@@ -92,7 +93,7 @@ def _apply_settings(scene: bpy.types.Scene) -> None:
         scene.render.compositor_device = "CPU"
 
 
-def _make_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
+def make_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     """A compositor tree that passes the render on, for a scene that has none."""
     if has_scene_tree():
         scene.use_nodes = True
@@ -152,7 +153,7 @@ def set_up(scene: bpy.types.Scene) -> list[str]:
         notes.append("Use Nodes was off: it has been switched on, with the nodes that were there.")
     _remember(scene, tree_is_new=tree is None)
     if tree is None:
-        tree = _make_tree(scene)
+        tree = make_tree(scene)
     elif has_scene_tree():
         scene.use_nodes = True
     _apply_settings(scene)
@@ -183,7 +184,7 @@ def _insert(scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.N
         _link(tree, sky_node.outputs["Image"], group.inputs["Environment"])
 
     if not group.inputs["Render"].is_linked:
-        output = _output_node(tree)
+        output = output_node(tree)
         layers = render_layers(tree, scene)
         layer = _background_layer(output.inputs[0], layers, set()) if output is not None else None
         if layer is None:
@@ -242,7 +243,7 @@ def remove(scene: bpy.types.Scene) -> None:
         tree_is_new = bool(before.get("tree_is_new"))
         _unlink(tree, tree_is_new=tree_is_new)
         if tree_is_new and all(node.get(ROLE) for node in tree.nodes):
-            _remove_tree(scene, tree)
+            remove_tree(scene, tree)
         else:
             for node in tree.nodes:  # what remains is the artist's own from now on
                 if ROLE in node:
@@ -288,18 +289,19 @@ def _give_back(tree: bpy.types.NodeTree, group: bpy.types.Node) -> None:
     if not group.inputs["Render"].is_linked:
         return
     picture = group.inputs["Render"].links[0].from_socket
-    output = _output_node(tree)
+    output = output_node(tree)
     for link in list(group.outputs["Image"].links):
         if group.get(OUTPUT_LINK) and output is not None and link.to_socket == output.inputs[0]:
             continue
         tree.links.new(picture, link.to_socket)
 
 
-def _remove_tree(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
+def remove_tree(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
     """Remove a tree that the set-up made and nobody added to."""
     if has_scene_tree():
         for node in tree.nodes:  # the tree itself is part of the scene and cannot go
-            del node[ROLE]
+            if ROLE in node:
+                del node[ROLE]
     else:
         scene.compositing_node_group = None
         bpy.data.node_groups.remove(tree)

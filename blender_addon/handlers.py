@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, maps, messages, node_group, shot, sync
+from . import baking, lens_render, lens_sync, maps, messages, node_group, shot, sync
 from ._physics import physics
 from .compositor_tree import check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -26,6 +26,8 @@ _devices: dict[str, str] = {}
 _told: set[str] = set()
 # Scenes whose unstable orbit was mentioned in this render.
 _noted: set[str] = set()
+# Scenes with the Cycles Lens that are being rendered: what the viewport would need stays away from them.
+_rendering: set[str] = set()
 # Set while this module itself steps the scene to other frames.
 _busy = False
 
@@ -51,7 +53,10 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
     if without_window():
         messages.end_process(text)
         return
-    sync.point_at_nothing(scene)
+    if lens_sync.is_on(scene):
+        lens_sync.break_camera(scene)
+    else:
+        sync.point_at_nothing(scene)
     messages.warn(text)
     if scene.name not in _told:
         _told.add(scene.name)
@@ -66,21 +71,25 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     _told.discard(scene.name)
     _noted.discard(scene.name)
-    if not is_in_use(scene):
+    if not _is_ours(scene):
+        return
+    if len(shot.holes(scene)) > 1:
+        messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
+    if lens_sync.is_on(scene):
+        _rendering.add(scene.name)
+        _guarded(lens_render.begin, scene)
         return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
-    if len(shot.holes(scene)) > 1:
-        messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
     _guarded(sync.sync_sky, scene)
 
 
 @persistent
 def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A frame begins."""
-    if not is_in_use(scene):
+    if not _is_ours(scene):
         return
     if messages.is_ending():
         messages.end_process("A frame before this one failed.")
@@ -91,16 +100,28 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
 @persistent
 def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """The frame is evaluated."""
-    if _busy or depsgraph is None or depsgraph.mode != "RENDER" or scene.name not in _waiting:
+    if _busy or depsgraph is None:
+        return
+    if depsgraph.mode != "RENDER" and lens_sync.is_on(scene) and scene.name not in _rendering:
+        lens_sync.show_live(scene, depsgraph)
+    if depsgraph.mode != "RENDER" or scene.name not in _waiting:
         return
     _guarded(lambda each: _provide_map(each, depsgraph), scene)
+
+
+@persistent
+def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """Something has changed: the viewport's camera follows."""
+    if depsgraph is None or _busy or scene.name in _rendering or not lens_sync.is_on(scene):
+        return
+    lens_sync.show_live(scene, depsgraph)
 
 
 @persistent
 def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The frame is done."""
     if scene.name in _waiting:
-        _fail(scene, f"Frame {scene.frame_current} was rendered without a warp map.")
+        _fail(scene, f"Frame {scene.frame_current} was rendered without its warp map or lens.")
 
 
 @persistent
@@ -112,12 +133,25 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     """
     _restore_device(scene)
     baking.forget_shared_rays()
+    if scene.name in _rendering:
+        _rendering.discard(scene.name)
+        _waiting.discard(scene.name)
+        lens_render.end(scene)
+        return
     if scene.name in _waiting:  # cancelled half-way
         _waiting.discard(scene.name)
         sync.refresh(scene)
 
 
+def _is_ours(scene: bpy.types.Scene) -> bool:
+    """Whether rendering the scene shows its black hole."""
+    return lens_sync.is_on(scene) or is_in_use(scene)
+
+
 def _take_map_away(scene: bpy.types.Scene) -> None:
+    if lens_sync.is_on(scene):
+        lens_sync.break_camera(scene)
+        return
     sync.point_at_nothing(scene)
     check_rendered(scene)
 
@@ -137,16 +171,13 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     finally:
         _busy = False
     parameters = frame_shot.parameters
-    path = baking.path_of(scene, frame_shot)
     _note_unstable_orbit(scene, parameters)
-    fault = maps.fault_of(path, parameters)
-    if fault is not None:
-        if not scene.umbra.auto_bake:
-            raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
-        where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
-        print(f"Umbra: baking the warp map of frame {frame_shot.frame}{where}", flush=True)
-        for _fraction in baking.bake_map(path, parameters):
-            pass
+    if lens_sync.is_on(scene):
+        lens_render.provide(scene, depsgraph, frame_shot)
+        _waiting.discard(scene.name)
+        return
+    path = baking.path_of(scene, frame_shot)
+    baking.provide_map(scene, path, parameters, frame_shot.frame)
     _check_resolved(path, frame_shot)
     sync.point_at_maps(scene)
     _waiting.discard(scene.name)
@@ -183,7 +214,11 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     """A file was opened: bring node groups of an older version of this add-on up to date."""
     _waiting.clear()
     _devices.clear()
+    _rendering.clear()
+    lens_render.forget()
     for scene in bpy.data.scenes:
+        if lens_sync.is_on(scene) and scene.library is None:
+            lens_sync.show_live(scene)
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
             setup.group.node_tree = node_group.ensure_group()
@@ -212,6 +247,7 @@ _HANDLERS = {
     "render_init": on_render_init,
     "render_pre": on_render_pre,
     "frame_change_post": on_frame_change_post,
+    "depsgraph_update_post": on_depsgraph_update,
     "render_post": on_render_post,
     "render_complete": on_render_end,
     "render_cancel": on_render_end,

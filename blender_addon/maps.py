@@ -9,24 +9,43 @@ minus signs): frame f is file f, and frame -5 is file 999995.
 
 import errno
 import os
+import re
 import shutil
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
-from ._physics import physics
+from ._physics import exit_map_file, physics
 from .errors import MapFolderError, SceneError
 
 SEQUENCE_LENGTH = 1_000_000
 # Frames that have a file of their own.
 FIRST_FRAME, LAST_FRAME = -100_000, SEQUENCE_LENGTH - 100_001
 
-BYTES_PER_PIXEL = 16  # four float32, before compression: an upper bound for the size of a map
+BYTES_PER_PIXEL = 32  # eight float32, before compression: an upper bound for the size of a map of either kind
 
 DEFAULT_FOLDER = "//umbra_maps/"
 _TEMPORARY_FOLDER = "umbra_maps"
+
+
+@dataclass(frozen=True)
+class MapKind:
+    """What a file is read as: the map of the compositor, or that of the camera that bends its rays."""
+
+    noun: str
+    read: Callable[[Path], object]
+    read_metadata: Callable[[Path], dict]
+
+
+WARP_MAP = MapKind("warp map", physics.read_warp_map, physics.read_warp_map_metadata)
+EXIT_MAP = MapKind("exit map", exit_map_file.read_exit_map, exit_map_file.read_exit_map_metadata)
+
+# What stands between an exit map's frame and the beginning of its hash.
+_EXIT_MARK = "_exit_"
+_HASH_CHARACTERS = 12
 
 
 @dataclass(frozen=True)
@@ -82,6 +101,31 @@ def map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], fram
     return folder(scene).path / file_name(scene, hole_name, size, frame)
 
 
+def exit_map_path(
+    scene: bpy.types.Scene, hole_name: str, parameters: "physics.WarpMapParameters", frame: int
+) -> Path:
+    """Where the exit map of a frame lies, or will lie.
+
+    Its name contains the hash of what it is made from: Cycles keeps textures by their names, and a map that is baked
+    anew must not be taken for the one before.
+    """
+    name = file_name(scene, hole_name, parameters.map_size, frame)
+    hashed = f"{_EXIT_MARK}{parameters.hash[:_HASH_CHARACTERS]}.exr"
+    return folder(scene).path / (name.removesuffix(".exr") + hashed)
+
+
+def older_exit_maps(path: Path) -> list[Path]:
+    """The exit maps of the same frame and size that were made from other parameters."""
+    beginning = path.name[: path.name.rindex(_EXIT_MARK) + len(_EXIT_MARK)]
+    others = path.parent.iterdir() if path.parent.is_dir() else ()
+    return [each for each in others if each.name.startswith(beginning) and each.suffix == ".exr" and each != path]
+
+
+def kind_of(path: Path) -> MapKind:
+    """What a file of the folder is read as, by its name."""
+    return EXIT_MAP if _EXIT_MARK in path.name else WARP_MAP
+
+
 def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
     """The same path as Blender's data should carry it: relative to the .blend file once that is saved."""
     return folder(scene).blender_path + file_name(scene, hole_name, size, frame)
@@ -97,30 +141,30 @@ def fault_of(path: Path, parameters: "physics.WarpMapParameters", *, thorough: b
 
     Thorough: its pixels are read and checked too (some 0.1 s in full HD); otherwise the header is taken at its word.
     """
+    kind = kind_of(path)
     if not path.is_file():
-        return f"The warp map {path} is missing"
+        state = "out of date" if kind is EXIT_MAP and older_exit_maps(path) else "missing"
+        return f"The {kind.noun} {path} is {state}"
     try:
-        if physics.read_warp_map_metadata(path)["hash"] != parameters.hash:
-            return f"The warp map {path} is out of date"
+        if kind.read_metadata(path)["hash"] != parameters.hash:
+            return f"The {kind.noun} {path} is out of date"
         if thorough:
-            physics.read_warp_map(path)
+            kind.read(path)
     except physics.WarpMapError as error:
         return str(error).removesuffix("; bake it again.")
     return None
 
 
-def count_baked(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frames: range) -> int:
+def count_baked(
+    scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frames: range, kind: MapKind = WARP_MAP
+) -> int:
     """Number of the frames that have a map, up to date or not."""
-    beginning = stem(scene, hole_name, size)
+    ending = rf"{_EXIT_MARK}[0-9a-f]+\.exr" if kind is EXIT_MAP else r"\.exr"
+    pattern = re.compile(re.escape(stem(scene, hole_name, size)) + r"(\d+)" + ending)
     try:
         with os.scandir(folder(scene).path) as entries:
-            numbers = {
-                int(entry.name[len(beginning) : -4])
-                for entry in entries
-                if entry.name.startswith(beginning)
-                and entry.name.endswith(".exr")
-                and entry.name[len(beginning) : -4].isdecimal()
-            }
+            matches = [pattern.fullmatch(entry.name) for entry in entries]
+            numbers = {int(match[1]) for match in matches if match is not None}
     except OSError:
         return 0
     return sum(frame % SEQUENCE_LENGTH in numbers for frame in frames)

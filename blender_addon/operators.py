@@ -6,11 +6,11 @@ from functools import wraps
 
 import bpy
 
-from . import baking, compositing, environment, maps, shot, sync
+from . import baking, compositing, environment, foreground, lens_sync, maps, output, shot, sync
 from ._physics import physics
 from .compositor_tree import find_setup
 from .errors import SceneError
-from .properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
+from .properties import COMPOSITOR, CYCLES_LENS, DEFAULT_MASS_SCALE, LARGEST_SPIN
 
 TIMER_INTERVAL = 0.02  # seconds between steps of a bake that runs beside the interface
 
@@ -76,6 +76,9 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
 
         settings = scene.umbra
         settings.active_hole = hole
+        if lens_sync.is_on(scene):
+            lens_sync.show_live(scene)
+            return {"FINISHED"}
         stars = False
         if settings.environment_source == "WORLD":
             try:
@@ -137,6 +140,8 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if lens_sync.is_on(context.scene):
+            raise SceneError("This scene's output is the Cycles Lens: choose Output: Compositor first.")
         _report_notes(self, compositing.set_up(context.scene))
         return {"FINISHED"}
 
@@ -172,6 +177,58 @@ class UMBRA_OT_use_star_sky(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class UMBRA_OT_set_output(bpy.types.Operator):
+    bl_idname = "umbra.set_output"
+    bl_label = "Set Output"
+    bl_description = "Choose how the black hole comes into the picture, and set the scene up for it"
+    bl_options = {"REGISTER", "UNDO"}
+
+    output: bpy.props.EnumProperty(
+        name="Output", items=((COMPOSITOR, "Compositor", ""), (CYCLES_LENS, "Cycles Lens", "")), default=CYCLES_LENS
+    )
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _report_notes(self, output.switch(context.scene, self.output))
+        return {"FINISHED"}
+
+
+class UMBRA_OT_foreground(bpy.types.Operator):
+    bl_idname = "umbra.set_up_foreground"
+    bl_label = "Unlensed Foreground"
+    bl_description = (
+        "Have objects nearer than the hole unlensed in front: they go into the collection Umbra Foreground, which a "
+        "second scene renders with the unbent camera. Running it again adds new ones"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return lens_sync.is_on(context.scene)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        added = foreground.set_up(context.scene, context.evaluated_depsgraph_get())
+        self.report({"INFO"}, f"In front of the hole: {', '.join(added) or 'nothing new'}.")
+        return {"FINISHED"}
+
+
+class UMBRA_OT_remove_foreground(bpy.types.Operator):
+    bl_idname = "umbra.remove_foreground"
+    bl_label = "Remove Foreground"
+    bl_description = "Take the unlensed foreground out again: its scene, its collection and its compositor nodes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.umbra.foreground is not None
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        foreground.remove(context.scene)
+        return {"FINISHED"}
+
+
 # --- baking ---------------------------------------------------------------------------------------
 
 
@@ -195,6 +252,8 @@ class BakeOperator:
     def _start(self, context: bpy.types.Context) -> Generator:
         scene = context.scene
         shot.active_hole(scene)
+        if lens_sync.is_on(scene) and not lens_sync.uses_maps(scene):
+            raise SceneError("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         if len(shot.holes(scene)) > 1 and scene.umbra.active_hole is not None:
             self.report({"WARNING"}, _only_one_is_rendered(scene))
         return baking.bake_frames(scene.name, self.frames(scene), context.view_layer.name)
@@ -331,6 +390,9 @@ CLASSES = (
     UMBRA_OT_setup_compositor,
     UMBRA_OT_remove_compositor,
     UMBRA_OT_use_star_sky,
+    UMBRA_OT_set_output,
+    UMBRA_OT_foreground,
+    UMBRA_OT_remove_foreground,
     UMBRA_OT_bake_frame,
     UMBRA_OT_bake_animation,
     UMBRA_OT_stop_baking,

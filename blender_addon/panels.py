@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import operators, shot, status
+from . import lens_sync, operators, shot, status
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
 
@@ -50,6 +50,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
             layout.operator("umbra.add_black_hole", text="Add Black Hole", icon="ADD")
         else:
             layout.prop(scene.umbra, "active_hole")
+            layout.row().prop(scene.umbra, "output", expand=True)
         _draw_lines(layout, status.lines(context))
 
         if operators.running is not None:
@@ -59,8 +60,11 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
             return
         if hole is None:
             return
-        if find_setup(scene) is None:
+        lensed = lens_sync.is_on(scene)
+        if not lensed and find_setup(scene) is None:
             layout.operator("umbra.setup_compositor", icon="NODE_COMPOSITING")
+        if lensed and not lens_sync.uses_maps(scene):
+            return
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")
         row.operator("umbra.bake_animation", icon="RENDER_ANIMATION")
@@ -114,6 +118,29 @@ def _draw_inputs(layout: bpy.types.UILayout, group: bpy.types.Node, names: tuple
             layout.prop(socket, "default_value", text=name)
 
 
+class VIEW3D_PT_umbra_lens(_Panel, bpy.types.Panel):
+    bl_label = "Lens"
+    bl_parent_id = "VIEW3D_PT_umbra"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return lens_sync.is_on(context.scene)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        settings = context.scene.umbra
+        layout.prop(settings, "lens_rays")
+        layout.prop(settings, "sphere_radius")
+        layout.prop(settings, "redshift_colour")
+        layout.prop(settings, "redshift_brightness")
+        layout.prop(settings, "sky_temperature")
+        layout.prop(settings, "cpu_fallback")
+        layout.operator("umbra.set_up_foreground", icon="OUTLINER_COLLECTION")
+        if settings.foreground is not None:
+            layout.operator("umbra.remove_foreground", icon="X")
+
+
 class VIEW3D_PT_umbra_maps(_Panel, bpy.types.Panel):
     bl_label = "Warp Maps"
     bl_parent_id = "VIEW3D_PT_umbra"
@@ -158,4 +185,11 @@ class OBJECT_PT_umbra(bpy.types.Panel):
             layout.operator("umbra.make_active")
 
 
-CLASSES = (VIEW3D_PT_umbra, VIEW3D_PT_umbra_hole, VIEW3D_PT_umbra_sky, VIEW3D_PT_umbra_maps, OBJECT_PT_umbra)
+CLASSES = (
+    VIEW3D_PT_umbra,
+    VIEW3D_PT_umbra_hole,
+    VIEW3D_PT_umbra_sky,
+    VIEW3D_PT_umbra_lens,
+    VIEW3D_PT_umbra_maps,
+    OBJECT_PT_umbra,
+)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ._physics import metric, physics
+from ._physics import colour, lens, metric, physics
 
 # physics accepts spins up to this; a hole spinning the other way is the object turned over.
 LARGEST_SPIN = 0.9999
@@ -32,6 +32,10 @@ ACCURACIES = {
     "STANDARD": (physics.DEFAULT_TOLERANCE, physics.DEFAULT_INTERPOLATION),
     "REFERENCE": (1e-11, 0.0),
 }
+
+# What becomes of the hole: identifiers that are saved in files.
+COMPOSITOR, CYCLES_LENS = "COMPOSITOR", "CYCLES_LENS"
+EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
 # Blender saves an enum's number, so a method keeps the one it has here.
 METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
@@ -138,6 +142,85 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         poll=_is_hole,
         update=lambda settings, _context: _refresh(settings),
     )
+    output: bpy.props.EnumProperty(
+        name="Output",
+        description="How the black hole comes into the picture",
+        items=(
+            (COMPOSITOR, "Compositor", "The sky is bent behind the render: every engine, and a new sky costs nothing"),
+            (
+                CYCLES_LENS,
+                "Cycles Lens",
+                "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole",
+            ),
+        ),
+        default=COMPOSITOR,
+        update=lambda settings, _context: _output_changed(settings),
+        options=set(),
+    )
+    lens_rays: bpy.props.EnumProperty(
+        name="Rays",
+        description="Where the camera takes its bent rays from when rendering",
+        items=(
+            (EXIT_MAP, "Exit Map", "From a baked map, as fast as a plain camera; beside the shadow they are traced"),
+            (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render"),
+        ),
+        default=EXIT_MAP,
+        options=set(),
+    )
+    sphere_radius: bpy.props.FloatProperty(
+        name="Lens Sphere",
+        description="Radius, in M, of the sphere around the hole where bent rays begin. Objects are seen outside of it "
+        "only; the rest of the picture does not depend on it",
+        default=lens.DEFAULT_SPHERE_RADIUS,
+        min=2.0,
+        soft_min=5.0,
+        soft_max=50.0,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    redshift_colour: bpy.props.FloatProperty(
+        name="Redshift Colour",
+        description="How much the change of frequency changes colours: 0 not at all, 1 as physics has it",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=lambda settings, _context: _refresh(settings),
+    )
+    redshift_brightness: bpy.props.FloatProperty(
+        name="Redshift Brightness",
+        description="How much the change of frequency changes brightness: 0 not at all, 1 as physics has it",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=lambda settings, _context: _refresh(settings),
+    )
+    sky_temperature: bpy.props.FloatProperty(
+        name="Sky Temperature",
+        description="Temperature of the light, in kelvin, that the colour shift assumes",
+        default=colour.DEFAULT_TEMPERATURE,
+        min=500.0,
+        soft_max=40000.0,
+        max=1e6,
+        step=10000,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    foreground: bpy.props.PointerProperty(
+        name="Foreground",
+        description="Collection of the objects that are shown unlensed in front of the hole",
+        type=bpy.types.Collection,
+    )
+    foreground_scene: bpy.props.PointerProperty(
+        name="Foreground Scene",
+        description="Scene of the unbent camera that renders the foreground",
+        type=bpy.types.Scene,
+    )
+    cpu_fallback: bpy.props.BoolProperty(
+        name="CPU if the GPU Cannot",
+        description="Render on the CPU when the GPU cannot run camera shaders. Switched off, that is an error",
+        default=True,
+        options=set(),
+    )
     map_folder: bpy.props.StringProperty(
         name="Warp Maps",
         description="Folder of the warp maps, one file a frame. // means beside the .blend file; a file that "
@@ -235,12 +318,20 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 
 def _refresh(settings: UmbraSceneProperties) -> None:
-    """Carry a change into the compositor, where the set-up is in place."""
-    from . import sync  # it reads these properties, hence not at the top
+    """Carry a change into the compositor or the camera, where the set-up is in place."""
+    from . import lens_sync, sync  # they read these properties, hence not at the top
 
     scene = settings.id_data
     if isinstance(scene, bpy.types.Scene) and sync.find_setup(scene) is not None:
         sync.refresh(scene)
+    if isinstance(scene, bpy.types.Scene) and settings.output == CYCLES_LENS:
+        lens_sync.show_live(scene)
+
+
+def _output_changed(settings: UmbraSceneProperties) -> None:
+    from . import output  # it reads these properties, hence not at the top
+
+    output.on_switched(settings.id_data)
 
 
 def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ._physics import physics
 from .errors import SceneError
-from .properties import CAMERA_ANIMATION, MOTIONS, tolerances_of
+from .lens_camera import original_type
+from .properties import CAMERA_ANIMATION, CYCLES_LENS, MOTIONS, tolerances_of
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -33,6 +34,8 @@ class Shot:
     frame: int
     hole_name: str
     parameters: physics.WarpMapParameters
+    length_of_m: float
+    """Scene units."""
 
     @property
     def distance(self) -> float:
@@ -207,18 +210,18 @@ def render_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
     )
 
 
-def check_render(render: bpy.types.RenderSettings) -> None:
-    """Refuse render settings for which the map would not fit the picture.
+def check_render(render: bpy.types.RenderSettings, *, bends_rays: bool = False) -> None:
+    """Refuse render settings for which the map would not fit the picture; a camera that bends its rays takes a crop.
 
     Raises
     ------
     SceneError
         Crop to Render Region, or Stereoscopy.
     """
-    if render.use_border and render.use_crop_to_border:
+    if render.use_border and render.use_crop_to_border and not bends_rays:
         raise SceneError(
-            "Crop to Render Region is not supported with a black hole: switch it off in Output Properties > "
-            "Format (the render region itself works)."
+            "Crop to Render Region is not supported with a black hole in the compositor: switch it off in Output "
+            "Properties > Format (the render region itself works), or choose Output: Cycles Lens."
         )
     if render.use_multiview:
         raise SceneError(
@@ -244,7 +247,8 @@ def camera_model(
         An orthographic or custom camera, a panorama other than equirectangular, or one outside Cycles.
     """
     width, height = render_size(render)
-    if camera.type == "PERSP":
+    kind_of_lens = original_type(camera)
+    if kind_of_lens == "PERSP":
         return physics.PerspectiveCamera(
             width,
             height,
@@ -257,7 +261,7 @@ def camera_model(
             pixel_aspect_x=render.pixel_aspect_x,
             pixel_aspect_y=render.pixel_aspect_y,
         )
-    if camera.type == "PANO":
+    if kind_of_lens == "PANO":
         kind = _panorama_setting(camera, "panorama_type")
         if kind != "EQUIRECTANGULAR":
             raise SceneError(
@@ -273,7 +277,7 @@ def camera_model(
         return physics.PanoramaCamera(
             width, height, **{name: _panorama_setting(camera, name) for name in limits}
         )
-    if camera.type == "ORTHO":
+    if kind_of_lens == "ORTHO":
         raise SceneError(
             f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the '
             "camera perspective."
@@ -309,7 +313,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     physics.BlackHoleError
         Whatever makes the frame impossible, as one sentence for the artist.
     """
-    check_render(scene.render)
+    check_render(scene.render, bends_rays=scene.umbra.output == CYCLES_LENS)
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
     camera = scene.camera
@@ -356,7 +360,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         interpolation=interpolation,
     )
     parameters.validate()
-    return Shot(scene.frame_current, hole.name, parameters)
+    return Shot(scene.frame_current, hole.name, parameters, length_of_m)
 
 
 def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> Shot:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import baking, environment, maps, shot
+from . import baking, environment, lens_objects, lens_shader, lens_sync, maps, shot
 from ._physics import metric, physics
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
@@ -65,13 +65,20 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
         return wrapped("This scene has no black hole.", "INFO")
     try:
         # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
-        now = shot.read(scene, context.evaluated_depsgraph_get(), velocity=np.zeros(3))
+        depsgraph = context.evaluated_depsgraph_get()
+        now = shot.read(scene, depsgraph, velocity=np.zeros(3))
+        lensed = lens_sync.is_on(scene)
+        if lensed:
+            lens_sync.check(scene)
     except physics.BlackHoleError as error:
         return wrapped(str(error), "ERROR")
     found: list[Line] = []
-    if find_setup(scene) is None:
+    if lensed:
+        found += _lens_lines(scene, depsgraph, now)
+    elif find_setup(scene) is None:
         found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
-    found += _map_lines(scene, now)
+    if not lensed or lens_sync.uses_maps(scene):
+        found += _map_lines(scene, now)
     found += _place_lines(now)
     others = len(shot.holes(scene)) - 1
     if others > 0:
@@ -79,18 +86,31 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     return tuple(found)
 
 
+def _lens_lines(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, now: shot.Shot) -> list[Line]:
+    found: list[Line] = []
+    problem = lens_shader.device_problem(scene)
+    if problem is not None:
+        found += wrapped(problem, "INFO" if scene.umbra.cpu_fallback else "ERROR")
+    for warning in lens_objects.warnings(scene, depsgraph, now):
+        found += wrapped(warning, "INFO")
+    if shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
+        found += wrapped("The viewport shows the lens without the camera's speed; a render has it.", "INFO")
+    return found
+
+
 def _map_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
     folder = maps.folder(scene)
     path = baking.path_of(scene, now)
+    noun = maps.kind_of(path).noun
     found: list[Line] = []
     if not path.is_file():
-        found += wrapped("This frame's warp map is not baked.", "RADIOBUT_OFF")
+        found += wrapped(f"This frame's {noun} is not baked.", "RADIOBUT_OFF")
     elif shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
-        found += wrapped("This frame's warp map is baked; rendering checks it.", "CHECKMARK")
-    elif maps.is_fresh(path, now.parameters, thorough=False):
-        found += wrapped("This frame's warp map is up to date.", "CHECKMARK")
+        found += wrapped(f"This frame's {noun} is baked; rendering checks it.", "CHECKMARK")
+    elif maps.is_fresh(path, baking.parameters_of(scene, now), thorough=False):
+        found += wrapped(f"This frame's {noun} is up to date.", "CHECKMARK")
     else:
-        found += wrapped("This frame's warp map is out of date.", "FILE_REFRESH")
+        found += wrapped(f"This frame's {noun} is out of date.", "FILE_REFRESH")
     frames = maps.frames_of(scene)
     found.append(Line(f"{_baked(scene, now, frames)} of {len(frames)} frames baked", "SEQUENCE"))
     if folder.is_temporary:
@@ -100,10 +120,11 @@ def _map_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
 
 def _baked(scene: bpy.types.Scene, now: shot.Shot, frames: range) -> int:
     size = now.parameters.map_size
-    key = (maps.folder(scene).path, maps.stem(scene, now.hole_name, size), frames)
+    kind = maps.kind_of(baking.path_of(scene, now))
+    key = (maps.folder(scene).path, maps.stem(scene, now.hole_name, size), frames, kind.noun)
     moment, number = _counted.get(key, (-COUNT_INTERVAL, 0))
     if time.monotonic() - moment >= COUNT_INTERVAL:
-        number = maps.count_baked(scene, now.hole_name, size, frames)
+        number = maps.count_baked(scene, now.hole_name, size, frames, kind)
         _counted.clear()
         _counted[key] = (time.monotonic(), number)
     return number

@@ -12,6 +12,7 @@ from .observer import Observer
 from .sharing import MapBaker, turned_map
 from .shot import (
     DEFAULT_INTERPOLATION,
+    IDENTITY,
     MOTIONS,
     SUPERSAMPLING,
     WarpMapParameters,
@@ -27,6 +28,7 @@ __all__ = [
     "DEFAULT_INTERPOLATION",
     "DEFAULT_METHOD",
     "DEFAULT_TOLERANCE",
+    "IDENTITY",
     "METHODS",
     "MOTIONS",
     "SUPERSAMPLING",

@@ -9,13 +9,16 @@ import numpy as np
 
 from .disk_pass import DiskPass
 from .errors import WarpMapError
-from .exr import PathLike, write_channels
-from .warp_map_file import CHANNELS, map_header, read_map
+from .exr import PathLike
+from .map_file import MapFormat, advice
 
-FORMAT = "umbra disk pass"
-FORMAT_VERSION = 1
-
-ATTRIBUTE_CROSSING = "umbraCrossing"
+FORMAT = MapFormat(
+    "umbra disk pass",
+    1,
+    "a disk pass",
+    "R: radius on the disk (M); G: azimuth in the hole's frame (radians); B: g; A: coverage",
+    attributes=("umbraCrossing",),
+)
 
 
 def write_disk_pass(path: PathLike, disk_pass: DiskPass) -> None:
@@ -33,15 +36,7 @@ def write_disk_pass(path: PathLike, disk_pass: DiskPass) -> None:
         When the file cannot be written.
     """
     planes = (disk_pass.radius, disk_pass.phi, disk_pass.g, disk_pass.coverage)
-    write_channels(
-        path,
-        dict(zip(CHANNELS, planes, strict=True)),
-        {
-            **map_header(f"{FORMAT} {FORMAT_VERSION}", disk_pass.metadata, planes),
-            ATTRIBUTE_CROSSING: str(disk_pass.metadata["crossing"]),
-            "comments": "R: radius on the disk (M); G: azimuth in the hole's frame (radians); B: g; A: coverage",
-        },
-    )
+    FORMAT.write(path, planes, disk_pass.metadata, (str(disk_pass.metadata["crossing"]),))
 
 
 def read_disk_pass(path: PathLike) -> DiskPass:
@@ -52,9 +47,9 @@ def read_disk_pass(path: PathLike) -> DiskPass:
     WarpMapError
         When the file is missing, damaged, cut short, or not a disk pass; the message names it and says which.
     """
-    (radius, phi, g, coverage), metadata, header = read_map(path, FORMAT, FORMAT_VERSION)
+    (radius, phi, g, coverage), metadata = FORMAT.read(path)
     disk = metadata["parameters"].get("disk")
-    crossing = str(header.get(ATTRIBUTE_CROSSING))
+    crossing = metadata.pop("umbraCrossing")
     seen = coverage > 0.0
     fits = (
         ((coverage >= 0.0) & (coverage <= 1.0)).all()
@@ -63,5 +58,5 @@ def read_disk_pass(path: PathLike) -> DiskPass:
         and (radius[seen] > 0.0).all()
     )
     if not (fits and disk and crossing.isdigit() and 1 <= int(crossing) <= disk["crossings"]):
-        raise WarpMapError(f"{path} is damaged: it holds values that no disk pass has; bake it again.")
+        raise WarpMapError(advice(f"{path} is damaged: it holds values that no disk pass has."))
     return DiskPass(radius, phi, g, coverage, {**metadata, "crossing": int(crossing)})

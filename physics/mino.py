@@ -185,6 +185,13 @@ class MinoSystem(ABC):
 
     def sky_direction(self, state: Array) -> Array:
         """Return the unit vectors towards which the rays of `state` leave, shape (n, 3)."""
+        return self.exit_lines(state)[0]
+
+    def exit_lines(self, state: Array) -> tuple[Array, Array]:
+        """Return what `sky_direction` does and the derivative of n by the Mino time at infinity, shape (n, 3) each.
+
+        psi' vanishes there.
+        """
         slope = np.empty_like(state)
         self.derivative(state, slope)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -192,7 +199,11 @@ class MinoSystem(ABC):
         final = state + slope * left
         n = final[N] / np.sqrt((final[N] ** 2).sum(axis=0))
         cos_psi, sin_psi = np.cos(final[PSI]), np.sin(final[PSI])
-        return np.stack([n[0] * cos_psi - n[1] * sin_psi, n[0] * sin_psi + n[1] * cos_psi, n[2]], axis=-1)
+        turned, rate = (
+            np.stack([v[0] * cos_psi - v[1] * sin_psi, v[0] * sin_psi + v[1] * cos_psi, v[2]], axis=-1)
+            for v in (n, final[N_PRIME])
+        )
+        return turned, rate
 
 
 class TurningRays(MinoSystem):

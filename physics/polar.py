@@ -11,7 +11,7 @@ for a slow turn about the axis. Taking the pole w = 1 out of the azimuth's rate 
 the first term is the azimuth along the great circle of inclination cos(i) = |b| / s_1, exactly, also through the
 poles, and f is smooth and small. So the ray's direction is n_0 cos(D) + t_0 sin(D), D = chi - chi_0, with the unit
 tangent t_0 = (theta' / s(w_0), b / (sin(theta_0) s_1)) on (theta-hat, phi-hat), turned about the axis by the
-integral of f over chi.
+integral of f over chi. Its rate in Mino time, by the same formulas, is s times the tangent n_0' and a turn of s f.
 
 D follows from the Mino time through lambda = integral of d chi / s. With M = A + a^2 w_+ / 2 and
 e = a^2 w_+ / (2 M), s^2 = M (1 - e cos(2 chi)), and 1 / s is a Fourier series whose coefficients fall like
@@ -106,8 +106,24 @@ class PolarMotion:
         direction = np.empty((3, len(mino_time)))
         for chosen, largest in self._classes():
             part = self.select(chosen)
-            direction[:, chosen] = part._direction(mino_time[chosen], rotation[chosen], largest, tolerance)
+            direction[:, chosen] = part._vectors(
+                *part._path(mino_time[chosen], rotation[chosen], largest, tolerance)
+            )
         return direction
+
+    def exit_lines(self, mino_time: Array, rotation: Array, tolerance: float) -> tuple[Array, Array]:
+        """Return what `direction` does and its derivative by the Mino time, without that of `rotation`; (3, n) each."""
+        direction, rate = np.empty((2, 3, len(mino_time)))
+        a2 = self.spin * self.spin
+        for chosen, largest in self._classes():
+            part = self.select(chosen)
+            cos, sin, turn = part._path(mino_time[chosen], rotation[chosen], largest, tolerance)
+            direction[:, chosen] = x, y, z = part._vectors(cos, sin, turn)
+            speed = np.sqrt(part.base + a2 * z * z)
+            drift = a2 * part.b / (part.pole_speed * (speed + part.pole_speed))
+            along = part._vectors(-sin, cos, turn)
+            rate[:, chosen] = speed * along + drift * np.stack([-y, x, np.zeros_like(z)])
+        return direction, rate
 
     def _classes(self) -> Iterator[tuple[Indices, float]]:
         """Yield the rays of each class of `ELLIPTICITY_CLASSES`, and the largest e of that class."""
@@ -205,8 +221,11 @@ class PolarMotion:
         names = ("tangent_theta", "tangent_phi", "base", "pole_speed", "b", "mean", "ellipticity")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
-    def _direction(self, mino_time: Array, rotation: Array, largest: float, tolerance: float) -> Array:
-        """Return what `direction` does, for rays with e up to `largest`."""
+    def _path(
+        self, mino_time: Array, rotation: Array, largest: float, tolerance: float
+    ) -> tuple[Array, Array, Array]:
+        """Return cosine and sine of the angle D along the path, and the whole turn about the axis, for e up to
+        `largest`."""
         a2 = self.spin * self.spin
         v, vertical = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta  # z components of n_0 and t_0
         swing = 0.5 * a2 / self.mean
@@ -242,6 +261,10 @@ class PolarMotion:
             path += _harmonics(drift, *phase(cos, sin))
             path -= _harmonics(drift, *start)
             turn = rotation + path * (a2 * self.b / (self.pole_speed * self.mean))
+        return cos, sin, turn
+
+    def _vectors(self, cos: Array, sin: Array, turn: Array) -> Array:
+        """Return n_0 cos + t_0 sin, turned about the axis by `turn`, shape (3, n)."""
         along_theta, along_phi = self.tangent_theta * sin, self.tangent_phi * sin
         x, y, z = (
             n_0 * cos + theta_hat * along_theta + phi_hat * along_phi for n_0, theta_hat, phi_hat in self.triad.T

@@ -31,7 +31,9 @@ TAIL = 2
 TAIL_SHARE = 0.15
 
 Directions = Callable[[Array, Array], Array]
-"""From pixel coordinates, shape (n,), to unit vectors in the sky, shape (n, 3); NaN where there is none."""
+"""From pixel coordinates, shape (n,), to unit vectors in the sky, shape (n, 3); NaN where there is none.
+
+Further vectors on the same axes may follow, in columns 3 to 5 and so on: they are interpolated along."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Arra
     good : ndarray of bool, shape (n,)
         Whether the interpolation's error is below `tolerance` radians; false where any sample sees no sky.
     """
-    values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, 3)
+    values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, -1)
     coefficients = _COEFFICIENTS @ np.moveaxis(values, -1, 1) @ _COEFFICIENTS.T
     size = np.abs(coefficients)
     rest = size[:, :, -TAIL:, :].sum(axis=(1, 2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(1, 2, 3))

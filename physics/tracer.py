@@ -99,7 +99,7 @@ def stepping(tableau: Tableau, systems: Systems) -> Tracer:
         for members, system in systems(rays, barrier, tolerance):
             if not len(members):
                 continue
-            outcome = _last(integrate(system, tableau, tolerance, max_steps))
+            outcome = last(integrate(system, tableau, tolerance, max_steps))
             resolved[members] = outcome.reached
             arrived = system.select(outcome.reached).sky_direction(outcome.state[:, outcome.reached])
             direction[members[outcome.reached]] = arrived
@@ -310,7 +310,8 @@ def drain(
             progress(fraction)
 
 
-def _last(rounds: Iterator[Integration | None]) -> Integration:
+def last(rounds: Iterator[Integration | None]) -> Integration:
+    """Return the outcome of an integration."""
     for outcome in rounds:
         if outcome is not None:
             return outcome

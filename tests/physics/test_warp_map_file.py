@@ -16,9 +16,9 @@ from physics import (
     WarpMapError,
     WarpMapParameters,
     bake,
+    map_file,
     read_warp_map,
     read_warp_map_metadata,
-    warp_map_file,
     write_warp_map,
 )
 from physics.exr import read_exr, read_exr_header, write_exr
@@ -167,7 +167,7 @@ def test_values_that_no_map_has(written, channel, value):
 
     with OpenEXR.File(str(written)) as file:
         changed = change(file.channels()["RGBA"].pixels.copy())
-        checksum = warp_map_file._checksum([changed[:, :, i] for i in range(4)])
+        checksum = map_file.checksum([changed[:, :, i] for i in range(4)])
     rewritten(written, change_pixels=change, umbraChecksum=checksum)
     with pytest.raises(WarpMapError, match="values that no warp map has"):
         read_warp_map(written)

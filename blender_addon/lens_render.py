@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What happens when a scene with the Cycles Lens is rendered; `handlers` calls it."""
+
+import bpy
+
+from . import baking, foreground, lens_objects, lens_shader, lens_sync, messages, shot
+from .errors import SceneError
+
+# The devices of scenes that are rendered on the CPU in place of a GPU, to be set back.
+_devices: dict[str, str] = {}
+
+
+def begin(scene: bpy.types.Scene) -> None:
+    """A render begins.
+
+    Raises
+    ------
+    SceneError
+        It cannot be rendered like this.
+    """
+    lens_sync.check(scene)
+    problem = lens_shader.device_problem(scene)
+    if problem is not None:
+        if not scene.umbra.cpu_fallback:
+            raise SceneError(problem)
+        messages.warn(f"{problem} This render is made on the CPU.")
+        _devices[scene.name] = scene.cycles.device
+        scene.cycles.device = "CPU"
+
+
+def end(scene: bpy.types.Scene) -> None:
+    """The render is over: the viewport sees the scene again, and needs no map."""
+    device = _devices.pop(scene.name, None)
+    if device is not None:
+        scene.cycles.device = device
+    lens_sync.show_live(scene)
+
+
+def forget() -> None:
+    """Drop what was to be set back, in a file that is gone."""
+    _devices.clear()
+
+
+def provide(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Shot) -> None:
+    """Make sure that the camera of the frame being rendered has the right parameters, and its map.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        There is no map and it may not, or cannot, be baked; or the camera cannot bend its rays.
+    """
+    for warning in lens_objects.warnings(scene, depsgraph, frame):
+        messages.warn(warning)
+    if scene.umbra.foreground_scene is not None:
+        foreground.copy_lens(scene.umbra.foreground_scene, scene.camera.evaluated_get(depsgraph).data)
+    if not lens_sync.uses_maps(scene):
+        lens_sync.show(scene, frame)
+        return
+    path = baking.path_of(scene, frame)
+    parameters = baking.parameters_of(scene, frame)
+    baking.provide_map(scene, path, parameters, frame.frame)
+    lens_sync.show(scene, frame, path)
