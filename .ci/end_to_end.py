@@ -102,6 +102,16 @@ def compare(folder: Path, sky: np.ndarray) -> None:
 def check_lens(blender: Blender, scene: Path) -> None:
     """The same scene with the Cycles Lens: both frames, from exit maps, a black shadow and a bent sky."""
     lensed = scene.with_name("lens.blend")
+    if "OSL: False" in blender.run("-b", "--python-expr", "import _cycles; print('OSL:', _cycles.with_osl)"):
+        output = blender.run(
+            *("-b", scene, "--python-exit-code", "1", "--python-expr"),
+            "import bpy; bpy.ops.umbra.set_output(output='CYCLES_LENS')",
+            status=1,
+        )
+        if "without Open Shading Language" not in output:
+            sys.exit(f"{output}\nThis Blender has no OSL, and the lens was refused without saying so.")
+        print("The lens could not be tried: this Blender was built without Open Shading Language. It says so.")
+        return
     switch = (
         "import bpy; s = bpy.context.scene; assert bpy.ops.umbra.set_output(output='CYCLES_LENS') == {'FINISHED'}; "
         f"s.render.filepath = '//lens_'; bpy.ops.wm.save_as_mainfile(filepath={str(lensed)!r})"
