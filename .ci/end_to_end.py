@@ -99,6 +99,40 @@ def compare(folder: Path, sky: np.ndarray) -> None:
         sys.exit("The camera moves, but both frames have the same map.")
 
 
+def check_lens(blender: Blender, scene: Path) -> None:
+    """The same scene with the Cycles Lens: both frames, from exit maps, a black shadow and a bent sky."""
+    lensed = scene.with_name("lens.blend")
+    if "OSL: False" in blender.run("-b", "--python-expr", "import _cycles; print('OSL:', _cycles.with_osl)"):
+        output = blender.run(
+            *("-b", scene, "--python-exit-code", "1", "--python-expr"),
+            "import bpy; bpy.ops.umbra.set_output(output='CYCLES_LENS')",
+            status=1,
+        )
+        if "without Open Shading Language" not in output:
+            sys.exit(f"{output}\nThis Blender has no OSL, and the lens was refused without saying so.")
+        print("The lens could not be tried: this Blender was built without Open Shading Language. It says so.")
+        return
+    switch = (
+        "import bpy; s = bpy.context.scene; assert bpy.ops.umbra.set_output(output='CYCLES_LENS') == {'FINISHED'}; "
+        f"s.render.filepath = '//lens_'; bpy.ops.wm.save_as_mainfile(filepath={str(lensed)!r})"
+    )
+    blender.run("-b", scene, "--python-exit-code", "1", "--python-expr", switch)
+    blender.run("-b", lensed, "-a")
+    pictures = sorted(scene.parent.glob("lens_*.exr"))
+    maps = sorted(scene.parent.rglob("umbra_maps/*_exit_*.exr"))
+    if len(pictures) != 2 or len(maps) != 2:
+        sys.exit(f"Expected two exit maps and two pictures with the lens, found {maps} and {pictures}.")
+    for path in pictures:
+        black = (read_exr(path)[0][..., :3].max(axis=-1) == 0.0).sum()
+        print(f"{path.name}: {black} px of shadow")
+        if not 100 < black < 0.5 * SIZE[0] * SIZE[1]:
+            sys.exit(f"{path.name} does not show a shadow of its size: {black} pixels are black.")
+    missing = "import bpy; s = bpy.context.scene; s.umbra.auto_bake = False; s.umbra.active_hole.umbra.spin = 0.1"
+    output = blender.run("-b", lensed, "--python-expr", missing, "-f", "1", status=1)
+    if "out of date" not in output:
+        sys.exit(f"{output}\nThe render failed, as it should, but did not say that the exit map is out of date.")
+
+
 def main() -> None:
     """Run the whole test in a temporary folder."""
     executable = os.environ.get("UMBRA_REAL_BLENDER")
@@ -138,6 +172,7 @@ def main() -> None:
             sys.exit(
                 f"{output}\nThe render failed, as it should, but did not say that the camera is orthographic."
             )
+        check_lens(blender, scene)
     print("End to end: passed.")
 
 

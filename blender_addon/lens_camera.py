@@ -47,8 +47,9 @@ def convert(camera: bpy.types.Camera) -> None:
         raise SceneError(f'Camera "{camera.name}" is linked from another file: make it local first.')
     forget(camera)
     before: dict[str, object] = {name: getattr(camera, name) for name in _REMEMBERED}
+    # Before 5.0 the group itself is a custom property, made when it is first looked at.
+    before["has_parameters"] = "cycles_custom" in camera
     before["parameters"] = {name: _plain(value) for name, value in camera.cycles_custom.items()}
-    before["has_parameters"] = "cycles_custom" in camera  # before 5.0 the group itself is a custom property
     camera[BEFORE] = before
     if camera.custom_shader is not None:
         camera[SHADER_BEFORE] = camera.custom_shader

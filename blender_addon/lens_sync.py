@@ -34,21 +34,14 @@ def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMap
     return replace(parameters, hole_to_world=physics.IDENTITY)
 
 
-def values_of(
-    scene: bpy.types.Scene, camera: bpy.types.Camera, frame: shot.Shot, map_path: Path | None = None
-) -> dict[str, object]:
-    """The shader's parameters for a frame; with an exit map, those of the variant that looks rays up.
-
-    Raises
-    ------
-    SceneError
-        The sphere reaches beyond the camera.
-    """
+def values_of(scene: bpy.types.Scene, frame: shot.Shot, map_path: Path | None = None) -> dict[str, object]:
+    """The shader's parameters for a frame; with an exit map, those of the variant that looks rays up."""
     settings = scene.umbra
     values = asdict(lens.LensNumbers.of(frame.parameters))
     values |= {
         "broken": 0,
-        "shift": (camera.shift_x, camera.shift_y, 0.0),
+        "shift": (*frame.shift, 0.0),
+        "aperture": frame.aperture,
         "length_of_m": frame.length_of_m,
         "sphere_radius": float(settings.sphere_radius),
         "redshift_colour": float(settings.redshift_colour),
@@ -104,8 +97,7 @@ def show(scene: bpy.types.Scene, frame: shot.Shot, map_path: Path | None = None)
     SceneError
         There is no camera, or its shader cannot be made.
     """
-    camera = camera_of(scene)
-    lens_shader.write(camera, values_of(scene, camera, frame, map_path))
+    lens_shader.write(camera_of(scene), values_of(scene, frame, map_path))
 
 
 def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:

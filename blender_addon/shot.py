@@ -36,6 +36,10 @@ class Shot:
     parameters: physics.WarpMapParameters
     length_of_m: float
     """Scene units."""
+    shift: tuple[float, float]
+    """Lens shift of the camera as Blender has it."""
+    aperture: float
+    """Radius of the camera's aperture, scene units, 0 without depth of field: Cycles' for any but custom cameras."""
 
     @property
     def distance(self) -> float:
@@ -288,6 +292,12 @@ def camera_model(
     )
 
 
+def _aperture(camera: bpy.types.Camera) -> float:
+    if not camera.dof.use_dof:
+        return 0.0
+    return camera.lens * 1e-3 / (2.0 * max(camera.dof.aperture_fstop, 1e-5))
+
+
 # --- all together ---------------------------------------------------------------------------------
 
 
@@ -360,7 +370,9 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         interpolation=interpolation,
     )
     parameters.validate()
-    return Shot(scene.frame_current, hole.name, parameters, length_of_m)
+    data = evaluated_camera.data
+    shift = (data.shift_x, data.shift_y)
+    return Shot(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data))
 
 
 def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> Shot:

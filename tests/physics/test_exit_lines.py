@@ -14,8 +14,8 @@ from physics.exit_lines import exit_lines
 from physics.exit_map import BILINEAR_TOLERANCE, IMPACT_SCALE, bake_exit_map
 from physics.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
 from physics.rays import camera_directions, rays_from_camera
-from physics.trapped import find_barrier
 from physics.tracer import Fate
+from physics.trapped import find_barrier
 
 
 def rays_of(spin, observer, count=500):
@@ -75,10 +75,10 @@ def test_directions_are_those_of_reference_rays():
 
 
 def schwarzschild_swept(b, r_cam, r_end):
-    """The angle a ray without spin sweeps from the camera in through its turning point and out to r_end.
+    """The angle a ray without spin sweeps from the camera through its turning point and out to r_end.
 
-    d phi / du = b / sqrt(1 - b^2 u^2 + 2 b^2 u^3), with u = u_t (1 - x^2) to take the turning point out, by the midpoint
-    rule: nothing of this is shared with the tracer.
+    d phi / du = b / sqrt(1 - b^2 u^2 + 2 b^2 u^3), with u = u_t (1 - x^2) to take the turning point out, by the
+    midpoint rule: nothing of this is shared with the tracer.
     """
     roots = np.roots([2.0 * b * b, -b * b, 0.0, 1.0])
     turning = min(root.real for root in roots if abs(root.imag) < 1e-9 and root.real > 0.0)
@@ -129,7 +129,7 @@ def test_exit_map_is_what_rays_say_and_agrees_with_the_warp_map():
 
 
 def test_usable_pixels_interpolate_as_well_as_they_claim():
-    """Between the centres of four usable pixels, rays of their own: three times the bound for what is left out of it."""
+    """Between the centres of four usable pixels, rays of their own; three times the bound for what it leaves out."""
     parameters = shot(320, 180, radius=30.0, spin=0.9, motion="fido")
     exits = bake_exit_map(parameters)
     finer = bake_exit_map(dataclasses.replace(parameters, supersampling=2, interpolation=0.0))

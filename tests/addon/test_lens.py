@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Cycles Lens: what it renders against Blender's own camera and against rays, and that it leaves no trace."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from small_scene import render, run_python, shrink
+
+SPHERES = 2000.0  # distance of what stands for "infinitely far", in M
+
+
+@pytest.fixture
+def exr(addon_module: Callable[[str], ModuleType]) -> ModuleType:
+    return addon_module("_physics").exr
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    """A small scene in the dark with a camera at (0, -6, 0) that looks along y, and maps of its own."""
+    scene = bpy.context.scene
+    shrink(scene, (160, 90))
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    scene.world = None
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    scene.camera.data.clip_end = 1e5
+    return scene
+
+
+def add_lens(scene: bpy.types.Scene, mass_scale: float = 0.2, **settings: object) -> bpy.types.Object:
+    hole = bpy.data.objects.new("Hole", None)
+    scene.collection.objects.link(hole)
+    hole.umbra.is_black_hole = True
+    hole.umbra.mass_scale = mass_scale
+    for name, value in settings.items():
+        setattr(hole.umbra, name, value)
+    scene.umbra.active_hole = hole
+    scene.umbra.redshift_colour = scene.umbra.redshift_brightness = 0.0
+    assert bpy.ops.umbra.set_output(output="CYCLES_LENS") == {"FINISHED"}
+    return hole
+
+
+def add_ball(place: tuple[float, ...], radius: float) -> bpy.types.Object:
+    """A ball that shines."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=place, segments=48, ring_count=24)
+    ball = bpy.context.object
+    made = bpy.data.materials.new("Light")
+    made.use_nodes = True
+    made.node_tree.nodes.clear()
+    light = made.node_tree.nodes.new("ShaderNodeEmission")
+    output = made.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    made.node_tree.links.new(light.outputs[0], output.inputs["Surface"])
+    ball.data.materials.append(made)
+    return ball
+
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning")
+
+
+@pytest.mark.parametrize("view", ["plain", "shift", "portrait", "border", "crop", "percentage", "panorama", "dof"])
+def test_a_hole_without_mass_changes_nothing(scene, tmp_path, exr, view) -> None:
+    """Same samples, same pixels: what differs is single precision at the balls' outlines."""
+    for place, radius in (((0.5, 3.0, 0.2), 0.6), ((-1.5, 8.0, 1.0), 1.5), ((0.6, -2.0, -0.3), 0.3)):
+        add_ball(place, radius)
+    data, settings = scene.camera.data, scene.render
+    scene.cycles.samples = 4
+    if view in ("shift", "crop"):
+        data.shift_x, data.shift_y = 0.1, -0.05
+    if view == "portrait":
+        settings.resolution_x, settings.resolution_y, data.shift_y = 90, 160, 0.1
+    if view in ("border", "crop"):
+        settings.use_border, settings.use_crop_to_border = True, view == "crop"
+        settings.border_min_x, settings.border_max_x = 0.2, 0.7
+        settings.border_min_y, settings.border_max_y = 0.3, 0.9
+    if view == "percentage":
+        settings.resolution_percentage = 50
+    if view == "panorama":
+        data.type = "PANO"
+        owner = data if hasattr(data, "panorama_type") else data.cycles
+        owner.panorama_type = "EQUIRECTANGULAR"
+    if view == "dof":
+        data.dof.use_dof, data.dof.focus_distance, data.dof.aperture_fstop = True, 9.0, 0.1
+    expected = render(scene, tmp_path / "plain.exr", exr)
+    add_lens(scene, 1e-6, spin=0.0)
+    for rays in ("IN_SHADER", "EXIT_MAP"):
+        scene.umbra.lens_rays = rays
+        picture = render(scene, tmp_path / f"{rays}.exr", exr)
+        assert picture.shape == expected.shape
+        different = np.abs(picture - expected)[..., :3].max(axis=-1) > 1e-3
+        assert expected[..., :3].max() > 0.5
+        assert different.mean() < 2e-3, f"{different.sum()} pixels differ"
+
+
+def swept(b: float, r_cam: float, r_end: float) -> float:
+    """Angle about a hole without spin that light with impact parameter b sweeps; midpoint rule, u = u_t (1 - x^2)."""
+    roots = np.roots([2.0 * b * b, -b * b, 0.0, 1.0])
+    turning = min(root.real for root in roots if abs(root.imag) < 1e-9 and root.real > 0.0)
+    total = 0.0
+    for radius in (r_cam, r_end):
+        end = math.sqrt(1.0 - 1.0 / (radius * turning))
+        x = (np.arange(4000) + 0.5) * end / 4000
+        u = turning * (1.0 - x * x)
+        rate = 1.0 - b * b * u * u + 2.0 * b * b * u**3
+        total += float(np.sum(2.0 * b * turning * x / np.sqrt(rate))) * end / 4000
+    return total
+
+
+@pytest.mark.parametrize("distance", [40.0, 1e5])
+def test_a_ball_straight_behind_makes_the_einstein_ring(scene, tmp_path, exr, distance) -> None:
+    """From r = 20; the ring of an infinitely distant ball is at 0.5206023578 radians (tests/data, Einstein rings)."""
+    r_cam, length = 20.0, 0.3
+    low, high = 5.3, 19.0
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if swept(middle, r_cam, distance) > math.pi else (low, middle)
+    angle = math.asin(low * math.sqrt(1.0 - 2.0 / r_cam) / r_cam)
+    if distance > 1e4:
+        assert angle == pytest.approx(0.520602357786737, abs=1e-4)
+    add_ball((0.0, distance * length, 0.0), 0.02 * distance * length)
+    scene.camera.data.lens = 15.0
+    scene.camera.data.sensor_fit = "HORIZONTAL"
+    shrink(scene, (160, 120))
+    scene.cycles.samples = 16
+    add_lens(scene, length, spin=0.0, motion="STATIC")
+    picture = render(scene, tmp_path / "ring.exr", exr)[..., 0]
+    row, column = np.mgrid[0:120, 0:160]
+    across, down = column + 0.5 - 80.0, row + 0.5 - 60.0
+    radius = np.hypot(across, down)
+    expected = math.tan(angle) * 160.0 * 15.0 / 36.0
+    near = np.abs(radius - expected) < 8.0  # the secondary ring lies at the shadow, farther in
+    for sector in range(8):
+        part = near & (np.floor((np.arctan2(down, across) + math.pi) / (math.pi / 4.0)) == sector)
+        assert picture[part].sum() > 1.0
+        assert abs((picture * radius)[part].sum() / picture[part].sum() - expected) < 1.0
+
+
+@pytest.mark.parametrize(("spin", "motion"), [(0.9, "FIDO"), (0.8, "CIRCULAR")])
+@pytest.mark.parametrize("offset", [(0.42, 0.1), (-0.24, 0.06), (0.05, -0.26), (-0.125, 0.02)])
+def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, spin, motion, offset) -> None:
+    """Rays traced by Eq. 2 as printed, which shares no equation of motion with the lens; the last is a secondary."""
+    physics = addon_module("_physics").physics
+    length, r_cam = 0.2, 30.0
+    position = (0.0, -r_cam, 0.0)
+    observer = physics.WarpMapParameters(
+        spin=spin,
+        camera=physics.PerspectiveCamera(160, 90, focal_length=50.0),
+        camera_position=position,
+        motion=motion.lower(),
+    ).observer()
+    look = np.array([offset[0], 1.0, offset[1]]) * (r_cam / 26.0, 1.0, r_cam / 26.0)
+    look /= np.linalg.norm(look)
+    # FIDO's triad at (0, -r, 0): r-hat = -y, theta-hat = -z, phi-hat = x; with B = phi-hat the camera's axes are
+    # r-hat, phi-hat and -theta-hat
+    theta_rd, phi_rd = math.acos(look[2]), math.atan2(look[0], -look[1])
+    result = physics.trace_rays(spin, observer, theta_rd, phi_rd, method="cash-karp-printed", tolerance=1e-9)
+    assert result.fate == physics.Fate.SKY
+    theta, phi = float(result.theta), float(result.phi)
+    towards = np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
+    add_ball(tuple(SPHERES * length * towards), 0.012 * SPHERES * length)
+    scene.cycles.samples = 64
+    scene.camera.data.lens = 30.0
+    add_lens(scene, length, spin=spin, motion=motion)
+    picture = render(scene, tmp_path / "ball.exr", exr)[..., 0]
+    per_pixel = 36.0 / 30.0 / 160.0
+    x, y = 80.0 + look[0] / look[1] / per_pixel, 45.0 - look[2] / look[1] / per_pixel
+    row, column = np.mgrid[0:90, 0:160]
+    near = np.hypot(column + 0.5 - x, row + 0.5 - y) < 5.0
+    light = np.where(near, picture, 0.0)
+    assert light.sum() > 0.02
+    seen = ((light * (column + 0.5)).sum() / light.sum(), (light * (row + 0.5)).sum() / light.sum())
+    assert math.hypot(seen[0] - x, seen[1] - y) < 1.0
+
+
+def test_the_picture_does_not_depend_on_the_sphere_nor_on_the_map(scene, tmp_path, exr) -> None:
+    for place, radius in (((0.7, 6.0, 0.3), 1.0), ((-3.0, 20.0, 2.0), 3.0), ((2.0, 4.5, -1.5), 0.7)):
+        add_ball(place, radius)
+    scene.cycles.samples = 16
+    add_lens(scene, 0.2, spin=0.9)
+    pictures = []
+    for rays, sphere in (("IN_SHADER", 15.0), ("IN_SHADER", 6.0), ("EXIT_MAP", 15.0)):
+        scene.umbra.lens_rays, scene.umbra.sphere_radius = rays, sphere
+        pictures.append(render(scene, tmp_path / f"{len(pictures)}.exr", exr)[..., 0])
+    assert 0.01 < pictures[0].mean() < 0.9
+    for other in pictures[1:]:
+        # a sample or two flips at an outline
+        assert np.abs(other - pictures[0]).mean() < 1e-3
+        assert np.abs(other - pictures[0]).max() < 0.3
+
+
+def test_switching_back_restores_the_camera(scene) -> None:
+    data = scene.camera.data
+    data.shift_x, data.sensor_fit, data.dof.use_dof, data.lens = 0.1, "VERTICAL", True, 33.0
+
+    def state() -> dict[str, object]:
+        kinds = {"FLOAT", "ENUM", "BOOLEAN", "STRING"}
+        names = [each.identifier for each in data.bl_rna.properties if each.type in kinds]
+        return {name: str(getattr(data, name)) for name in names} | {"keys": sorted(data.keys())}
+
+    before = state(), scene.render.use_lock_interface
+    add_lens(scene)
+    assert data.type == "CUSTOM"
+    scene.umbra.output = "COMPOSITOR"
+    assert (state(), scene.render.use_lock_interface) == before
+    assert not list(data.cycles_custom.keys())
+
+
+def test_the_compositor_comes_back_with_its_look(scene, addon_module) -> None:
+    assert bpy.ops.umbra.add_black_hole() == {"FINISHED"}
+    find = addon_module("compositor_tree").find_setup
+    find(scene).group.inputs["Exposure"].default_value = 1.5
+    find(scene).group.inputs["Redshift Colour"].default_value = 0.25
+    scene.umbra.output = "CYCLES_LENS"
+    assert find(scene) is None
+    assert scene.umbra.redshift_colour == pytest.approx(0.25)
+    scene.umbra.redshift_colour = 0.5
+    scene.umbra.output = "COMPOSITOR"
+    assert find(scene).group.inputs["Exposure"].default_value == pytest.approx(1.5)
+    assert find(scene).group.inputs["Redshift Colour"].default_value == pytest.approx(0.5)
+
+
+def test_nearer_objects_come_in_front(scene, tmp_path, exr) -> None:
+    near = add_ball((-0.5, -4.0, 0.2), 0.3)
+    add_lens(scene, 0.2, spin=0.5)
+    scene.umbra.sphere_radius = 9.0
+    without = render(scene, tmp_path / "without.exr", exr)[..., 0]
+    assert bpy.ops.umbra.set_up_foreground() == {"FINISHED"}
+    assert list(scene.umbra.foreground.objects) == [near]
+    picture = render(scene, tmp_path / "with.exr", exr)[..., 0]
+    # the ball's middle through the unbent camera: 50 mm, 36 mm, 160 pixels
+    x, y = int(80 - 0.5 / 2.0 * 50.0 / 36.0 * 160.0), int(45 - 0.2 / 2.0 * 50.0 / 36.0 * 160.0)
+    assert without[y, x] == 0.0
+    assert picture[y, x] == pytest.approx(1.0)
+    assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
+    assert len(bpy.data.scenes) == 1
+    np.testing.assert_array_equal(render(scene, tmp_path / "after.exr", exr)[..., 0], without)
+
+
+def test_objects_inside_the_sphere_are_named(scene, addon_module) -> None:
+    ball = add_ball((0.0, 1.0, 0.0), 0.2)
+    ball.name = "Probe"
+    add_lens(scene)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    frame = addon_module("shot").read(scene, depsgraph)
+    (sentence,) = addon_module("lens_objects").warnings(scene, depsgraph, frame)
+    assert sentence.startswith('"Probe" reaches into the lens sphere')
+
+
+def test_another_engine_is_refused(scene) -> None:
+    scene.render.engine = "BLENDER_WORKBENCH"
+    with pytest.raises(RuntimeError, match="needs the render engine Cycles"):
+        bpy.ops.umbra.set_output(output="CYCLES_LENS")
+    assert scene.umbra.output == "COMPOSITOR"
+
+
+def test_a_missing_map_ends_the_process(tmp_path) -> None:
+    result = run_python(f"""
+from small_scene import shrink
+scene = bpy.context.scene
+shrink(scene)
+bpy.ops.umbra.add_black_hole()
+scene.umbra.map_folder = {str(tmp_path)!r}
+bpy.ops.umbra.set_output(output="CYCLES_LENS")
+scene.umbra.auto_bake = False
+scene.render.filepath = {str(tmp_path / "picture.exr")!r}
+bpy.ops.render.render(write_still=True)
+""")
+    assert result.returncode == 1
+    assert "The exit map" in result.stderr
+    assert "is missing: bake it" in result.stderr
+    assert not (tmp_path / "picture.exr").exists()
