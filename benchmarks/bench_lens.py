@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the Cycles Lens costs: renders of one scene with the plain camera, with exit maps, and with rays traced in OSL."""
+"""What the Cycles Lens costs: one scene rendered with the plain camera, with exit maps, and with rays traced in OSL."""
 
 # isort: off
 import measuring  # before numpy
@@ -54,7 +54,8 @@ def main() -> None:
         scene.umbra.lens_rays = "IN_SHADER"
         times["lens, no bake"] = measuring.best_time(bpy.ops.render.render, options.repeats)
     rays = SIZE[0] * SIZE[1] * SAMPLES
-    print(f"\nBlender {bpy.app.version_string}, {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples: seconds, camera rays a second")
+    about = f"Blender {bpy.app.version_string}, {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples"
+    print(f"\n{about}: seconds, camera rays a second")
     for name, seconds in times.items():
         print(f"{name:16} {seconds:6.2f} {rays / seconds:12,.0f}")
 
