@@ -161,7 +161,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         name="Rays",
         description="Where the camera takes its bent rays from when rendering",
         items=(
-            (EXIT_MAP, "Exit Map", "From a baked map, as fast as a plain camera; beside the shadow they are traced"),
+            (EXIT_MAP, "Exit Map", "From a baked map, where it holds; beside the shadow the camera traces them itself"),
             (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render"),
         ),
         default=EXIT_MAP,

@@ -9,6 +9,7 @@ import numpy as np
 
 from .cameras import Camera, PanoramaCamera
 from .errors import BlackHoleError
+from .rays import Array
 from .shot import Vector, WarpMapParameters
 
 # The sphere around the hole that backward rays leave along their asymptotes, units of M.
@@ -74,6 +75,6 @@ def _plane(camera: Camera) -> tuple[Vector, Vector]:
     return corner, _vector(np.array([far[0] - corner[0], far[1] - corner[1], 0.0]))
 
 
-def _vector(values: np.ndarray) -> Vector:
+def _vector(values: Array) -> Vector:
     x, y, z = values.tolist()
     return x, y, z
