@@ -9,8 +9,9 @@ import numpy as np
 
 from .cameras import Camera, PanoramaCamera
 from .errors import BlackHoleError
-from .rays import Array
+from .rays import Array, redshift_vector
 from .shot import Vector, WarpMapParameters
+from .sphere import spherical_triad
 
 # The sphere around the hole that backward rays leave along their asymptotes, units of M.
 DEFAULT_SPHERE_RADIUS = 15.0
@@ -34,6 +35,9 @@ class LensNumbers:
     beta: float
     motion: Vector
     """Unit vector of the camera's motion on (r, theta, phi)-hat of the FIDO."""
+    redshift_constant: float
+    redshift_vector: Vector
+    """c_0 and c with 1 + z = c_0 + c . N for every ray of the camera."""
 
     @classmethod
     def of(cls, parameters: WarpMapParameters) -> LensNumbers:
@@ -49,6 +53,7 @@ class LensNumbers:
         observer = parameters.observer()
         axes = np.array(parameters.camera_to_hole)
         corner, size = _plane(parameters.camera)
+        constant, along = redshift_vector(parameters.spin, observer)
         return cls(
             panorama=int(isinstance(parameters.camera, PanoramaCamera)),
             plane_corner=corner,
@@ -60,6 +65,8 @@ class LensNumbers:
             forward=_vector(-axes[:, 2]),
             beta=observer.beta,
             motion=observer.direction,
+            redshift_constant=constant,
+            redshift_vector=_vector(spherical_triad(observer.theta, observer.phi).T @ along),
         )
 
 
