@@ -58,15 +58,15 @@ def end_process(text: str) -> None:
     farm or a script to learn of the failure. Frames that are already written stay.
 
     Blender's executable is asked to break the render off as by Ctrl-C: it writes no more frames, but finishes a
-    movie that it has begun. In Python's own process (the bpy module) Ctrl-C is Python's, and the process is ended
-    at once.
+    movie that it has begun. In Python's own process (the bpy module) Ctrl-C is Python's, or nobody's where a shell
+    started it in the background, and the process is ended at once.
     """
     global _is_ending
     if not _is_ending:
         print(f"Error: Umbra Black Hole: {text}", file=sys.stderr)
     sys.stdout.flush()
     sys.stderr.flush()
-    if _is_ending or callable(signal.getsignal(signal.SIGINT)):
+    if _is_ending or bpy.app.module:
         os._exit(1)
     _is_ending = True
     atexit.register(os._exit, 1)  # Blender itself would end with 0

@@ -45,8 +45,13 @@ def add_lens(scene: bpy.types.Scene, mass_scale: float = 0.2, **settings: object
     return hole
 
 
-def add_ball(place: tuple[float, ...], radius: float) -> bpy.types.Object:
-    """A ball that shines."""
+def add_ball(
+    place: tuple[float, ...],
+    radius: float,
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    socket: str = "Surface",
+) -> bpy.types.Object:
+    """A ball that shines, at its surface or throughout its volume."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=place, segments=48, ring_count=24)
     ball = bpy.context.object
     made = bpy.data.materials.new("Light")
@@ -54,7 +59,8 @@ def add_ball(place: tuple[float, ...], radius: float) -> bpy.types.Object:
     made.node_tree.nodes.clear()
     light = made.node_tree.nodes.new("ShaderNodeEmission")
     output = made.node_tree.nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(light.outputs[0], output.inputs["Surface"])
+    light.inputs["Color"].default_value = (*colour, 1.0)
+    made.node_tree.links.new(light.outputs[0], output.inputs[socket])
     ball.data.materials.append(made)
     return ball
 
@@ -110,8 +116,8 @@ def swept(b: float, r_cam: float, r_end: float) -> float:
     return total
 
 
-@pytest.mark.parametrize("distance", [40.0, 1e5])
-def test_a_ball_straight_behind_makes_the_einstein_ring(scene, tmp_path, exr, distance) -> None:
+@pytest.mark.parametrize(("distance", "socket"), [(40.0, "Surface"), (1e5, "Surface"), (40.0, "Volume")])
+def test_a_ball_straight_behind_makes_the_einstein_ring(scene, tmp_path, exr, distance, socket) -> None:
     """From r = 20; the ring of an infinitely distant ball is at 0.5206023578 radians (tests/data, Einstein rings)."""
     r_cam, length = 20.0, 0.3
     low, high = 5.3, 19.0
@@ -121,7 +127,7 @@ def test_a_ball_straight_behind_makes_the_einstein_ring(scene, tmp_path, exr, di
     angle = math.asin(low * math.sqrt(1.0 - 2.0 / r_cam) / r_cam)
     if distance > 1e4:
         assert angle == pytest.approx(0.520602357786737, abs=1e-4)
-    add_ball((0.0, distance * length, 0.0), 0.02 * distance * length)
+    add_ball((0.0, distance * length, 0.0), 0.02 * distance * length, socket=socket)
     scene.camera.data.lens = 15.0
     scene.camera.data.sensor_fit = "HORIZONTAL"
     shrink(scene, (160, 120))
@@ -139,10 +145,23 @@ def test_a_ball_straight_behind_makes_the_einstein_ring(scene, tmp_path, exr, di
         assert abs((picture * radius)[part].sum() / picture[part].sum() - expected) < 1.0
 
 
-@pytest.mark.parametrize(("spin", "motion"), [(0.9, "FIDO"), (0.8, "CIRCULAR")])
-@pytest.mark.parametrize("offset", [(0.42, 0.1), (-0.24, 0.06), (0.05, -0.26), (-0.125, 0.02)])
-def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, spin, motion, offset) -> None:
-    """Rays traced by Eq. 2 as printed, which shares no equation of motion with the lens; the last is a secondary."""
+@pytest.mark.parametrize(
+    ("spin", "motion", "offset", "primary"),
+    [
+        (0.9, "FIDO", (0.42, 0.1), True),
+        (0.9, "FIDO", (-0.24, 0.06), False),
+        (0.9, "FIDO", (0.05, -0.26), False),
+        (0.9, "FIDO", (-0.125, 0.02), False),
+        (0.8, "CIRCULAR", (-0.24, 0.06), True),
+        (0.8, "CIRCULAR", (0.42, 0.1), False),
+        (0.8, "CIRCULAR", (-0.125, 0.02), False),
+    ],
+)
+def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, spin, motion, offset, primary) -> None:
+    """Rays traced by Eq. 2 as printed, which shares no equation of motion with the lens.
+
+    A primary image stands on the same side of the hole as its ball, a secondary one on the other.
+    """
     physics = addon_module("_physics").physics
     length, r_cam = 0.2, 30.0
     position = (0.0, -r_cam, 0.0)
@@ -161,6 +180,7 @@ def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, s
     assert result.fate == physics.Fate.SKY
     theta, phi = float(result.theta), float(result.phi)
     towards = np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
+    assert (look[0] * towards[0] + look[2] * towards[2] > 0.0) == primary
     add_ball(tuple(SPHERES * length * towards), 0.012 * SPHERES * length)
     scene.cycles.samples = 64
     scene.camera.data.lens = 30.0
@@ -174,6 +194,58 @@ def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, s
     assert light.sum() > 0.02
     seen = ((light * (column + 0.5)).sum() / light.sum(), (light * (row + 0.5)).sum() / light.sum())
     assert math.hypot(seen[0] - x, seen[1] - y) < 1.0
+
+
+@pytest.mark.parametrize("primary", [True, False])
+@pytest.mark.parametrize("rays", ["EXIT_MAP", "IN_SHADER"])
+def test_balls_are_seen_where_reference_rays_say(scene, tmp_path, exr, rays, primary) -> None:
+    """Balls, red, green and blue, in the directions of reference rays from a circular orbit, spin 0.8, r = 9.
+
+    The camera looks along -x, so that the hole's x, y, z point against its view, to its right and up.
+    """
+    with np.load(Path(__file__).parent.parent / "data" / "reference_rays.npz") as archive:
+        table = {name: archive[name] for name in archive.files}
+    theta, phi = table["theta_rd"], table["phi_rd"]
+    seen = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    length, per_pixel = 0.2, 36.0 / 15.0 / 160.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = 80.0 - seen[:, 1] / seen[:, 0] / per_pixel, 45.0 + seen[:, 2] / seen[:, 0] / per_pixel
+    usable = (table["name"] == "D01_orbit") & (seen[:, 0] < -0.3) & ~table["shadow"] & (table["edge_dist"] > 0.03)
+    usable &= (np.abs(x - 80.0) < 70.0) & (np.abs(y - 45.0) < 36.0) & (table["amp"] < 8.0)
+    side = (seen[:, 1:] * table["n_cs"][:, 1:]).sum(axis=1)
+    chosen = np.flatnonzero(usable & (side > 0.05 if primary else side < -0.05))[:3]
+    assert len(chosen) >= 2
+    for colour, ray in zip(np.eye(3)[: len(chosen)], chosen, strict=True):
+        add_ball(tuple(SPHERES * length * table["n_cs"][ray]), 0.02 * SPHERES * length, tuple(colour))
+    scene.camera.location, scene.camera.rotation_euler = (9.0 * length, 0.0, 0.0), (math.pi / 2, 0.0, math.pi / 2)
+    scene.camera.data.lens, scene.camera.data.sensor_fit = 15.0, "HORIZONTAL"
+    scene.cycles.samples = 64
+    add_lens(scene, length, spin=0.8, motion="CIRCULAR")
+    scene.umbra.lens_rays, scene.umbra.sphere_radius = rays, 6.0
+    picture = render(scene, tmp_path / "balls.exr", exr)
+    row, column = np.mgrid[0:90, 0:160]
+    for channel, ray in enumerate(chosen):
+        near = np.hypot(column + 0.5 - x[ray], row + 0.5 - y[ray]) < 6.0
+        light = np.where(near, picture[..., channel], 0.0)
+        assert light.sum() > 0.02
+        place = (light * (column + 0.5)).sum() / light.sum(), (light * (row + 0.5)).sum() / light.sum()
+        assert math.hypot(place[0] - x[ray], place[1] - y[ray]) < 1.0
+
+
+def test_denoising_and_adaptive_sampling_keep_the_picture(scene, tmp_path, exr) -> None:
+    for place, radius in (((0.7, 6.0, 0.3), 1.0), ((-3.0, 20.0, 2.0), 3.0)):
+        add_ball(place, radius)
+    add_lens(scene, 0.2, spin=0.9)
+    scene.cycles.samples = 64
+    plain = render(scene, tmp_path / "plain.exr", exr)[..., 0]
+    scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = True, True
+    scene.cycles.adaptive_threshold = 0.02
+    cleaned = render(scene, tmp_path / "cleaned.exr", exr)[..., 0]
+    assert np.isfinite(cleaned).all()
+    assert 0.02 < plain.mean() < 0.9
+    # The denoiser moves light at the outlines, where a pixel is partly covered.
+    assert np.abs(cleaned - plain).mean() < 0.01
+    assert cleaned[plain == 0.0].mean() < 0.01
 
 
 def test_the_picture_does_not_depend_on_the_sphere_nor_on_the_map(scene, tmp_path, exr) -> None:
