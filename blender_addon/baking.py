@@ -74,10 +74,17 @@ def bake_map(
     physics.BlackHoleError
         The parameters are impossible, or the file cannot be written.
     """
-    maps.prepare(path, parameters.map_size)
+    maps.prepare(path, parameters.map_size, 1 + len(maps.pass_paths(path, parameters)))
     warp_map = yield from _baker.steps(parameters)
-    physics.write_warp_map(path, warp_map)
+    _write_all(path, warp_map)
     return warp_map
+
+
+def _write_all(path: Path, warp_map: "physics.WarpMap") -> None:
+    """Write a map and its disk's passes; the map comes last, so that where it holds they are there."""
+    for one in warp_map.disk_passes:
+        physics.write_disk_pass(maps.pass_path(path, one.metadata["crossing"]), one)
+    physics.write_warp_map(path, warp_map)
 
 
 def forget_shared_rays() -> None:
@@ -130,7 +137,8 @@ def bake_frames(
                 if maps.is_fresh(path, frame_shot.parameters):
                     summary.reused.append(frame)
                     continue
-                maps.prepare(path, frame_shot.parameters.map_size)
+                files = 1 + len(maps.pass_paths(path, frame_shot.parameters))
+                maps.prepare(path, frame_shot.parameters.map_size, files)
                 steps = _baker.steps(frame_shot.parameters)
                 while True:
                     try:
@@ -164,7 +172,7 @@ def _naming(frame: int, count: int) -> Iterator[None]:
 
 def _write(path: Path, warp_map: "physics.WarpMap", frame: int, count: int) -> None:
     with _naming(frame, count):
-        physics.write_warp_map(path, warp_map)
+        _write_all(path, warp_map)
 
 
 def finish(scene_name: str) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, maps, messages, node_group, shot, sync
+from . import baking, disk_sync, maps, messages, node_group, shot, sync
 from ._physics import physics
 from .compositor_tree import check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -148,6 +148,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
         for _fraction in baking.bake_map(path, parameters):
             pass
     _check_resolved(path, frame_shot)
+    disk_sync.write_shot(scene, parameters)
     sync.point_at_maps(scene)
     _waiting.discard(scene.name)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._physics import physics
+from .disk_properties import disk_of
 from .errors import SceneError
 from .properties import CAMERA_ANIMATION, MOTIONS, tolerances_of
 
@@ -354,6 +355,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         tolerance=tolerance,
         method=settings.method,
         interpolation=interpolation,
+        disk=disk_of(hole_settings.disk),
     )
     parameters.validate()
     return Shot(scene.frame_current, hole.name, parameters)
