@@ -105,7 +105,7 @@ INPUTS = (
     _factor(
         LOOK_SOCKETS["outer_softness"], "Share of the disk over which its outer edge fades out", _LOOK.outer_softness
     ),
-    _number(LOOK_SOCKETS["gain"], "How much brighter dense streaks are; at 1 no more than thin ones", _LOOK.gain, 1.0, 8.0),
+    _number(LOOK_SOCKETS["gain"], "How much brighter dense streaks are than thin ones", _LOOK.gain, 1.0, 8.0),
 )
 OUTPUTS = (
     SocketSpec(OUTPUT, "NodeSocketColor", "The disk, premultiplied, with its coverage as alpha", in_out="OUTPUT"),

@@ -5,6 +5,7 @@ Tables are a column of pixels, their first value at the top.
 """
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -32,7 +33,9 @@ def profile(name: str, exponent: float, spin: float, inner: float, outer: float,
     return disk_flux.relative_flux(name, spin, radii, inner, exponent, retrograde)
 
 
-def ensure_profile(name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool) -> bpy.types.Image:
+def ensure_profile(
+    name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool
+) -> bpy.types.Image:
     """The table of a disk's profile, as an image."""
     wanted = repr((name, exponent, spin, inner, outer, retrograde))
 
@@ -80,7 +83,7 @@ def ensure_texture() -> bpy.types.Image:
     return image
 
 
-def _ensure(name: str, made_from: str, pixels) -> bpy.types.Image:
+def _ensure(name: str, made_from: str, pixels: Callable[[], NDArray]) -> bpy.types.Image:
     image = bpy.data.images.get(name)
     if image is not None and image.get(_MADE_FROM) == made_from and image.packed_file is not None:
         return image

@@ -8,7 +8,7 @@ from .disk_nodes import PASSES
 
 # Blender saves an enum's number; identifiers are the physics' own names.
 PROFILES = (
-    ("novikov_thorne", "Page-Thorne", "As physics has it: dark at the innermost stable orbit, brightest a little outside"),
+    ("novikov_thorne", "Page-Thorne", "As physics has it: dark at the innermost stable orbit, brightest outside of it"),
     ("power_law", "Power Law", "Brightest at the inner edge, and dimmer outwards by a power of the radius"),
 )
 BEAMINGS = {"BOLOMETRIC": disk_look.BOLOMETRIC, "MONOCHROMATIC": disk_look.MONOCHROMATIC}
@@ -56,7 +56,7 @@ def _amount(name: str, field: str, description: str) -> "bpy.types.FloatProperty
 
 
 class UmbraDiskProperties(bpy.types.PropertyGroup):
-    """A thin disk of matter around the hole. The first six properties decide what is baked, the others how it looks."""
+    """A thin disk of matter around the hole. The first six decide what is baked, the others how it looks."""
 
     enabled: bpy.props.BoolProperty(
         name="Disk",
@@ -80,6 +80,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_min=1.0,
         soft_max=50.0,
         update=_changed,
+        options=set(),
     )
     outer_radius: bpy.props.FloatProperty(
         name="Outer Edge",
@@ -89,6 +90,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_min=2.0,
         soft_max=100.0,
         update=_changed,
+        options=set(),
     )
     retrograde: bpy.props.BoolProperty(
         name="Retrograde",
@@ -196,6 +198,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_min=-200.0,
         soft_max=200.0,
         update=_changed,
+        options=set(),  # time would jump: it is the frame times this
     )
     texture: bpy.props.PointerProperty(
         name="Texture",
@@ -206,7 +209,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     )
     light: bpy.props.BoolProperty(
         name="Light the Scene",
-        description="Add a glowing disk that lights the scene's objects in Cycles and EEVEE; the camera does not see it",
+        description="Add a glowing disk that lights the scene's objects in Cycles; the camera does not see it",
         default=False,
         update=_changed,
         options=set(),

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keep the group "Umbra Disk" in a scene's compositor while its hole has a disk, and in step with the settings.
 
-Settings that may be animated are followed by drivers, and so is time: a .blend and its maps render the same without
-this add-on. Only what follows from the disk's edges and the hole's spin is written into the sockets, by whoever
-knows the frame's shot.
+Time is followed by drivers that need no add-on, so that a .blend and its maps render the same without it. So are
+settings that are animated; but their drivers read this add-on's properties.
 """
 
 import math
@@ -13,6 +12,7 @@ import bpy
 from . import disk_group, disk_images, disk_light, disk_properties, shot
 from ._physics import disk_texture, orbiting_matter, physics
 from .compositor_tree import ROLE, Setup, find_node, find_setup
+from .errors import SceneError
 
 DISK = "disk"
 PASS_ROLES = tuple(f"disk_pass_{number}" for number in range(1, len(disk_group.PASS_NAMES) + 1))
@@ -54,18 +54,34 @@ def refresh(scene: bpy.types.Scene) -> None:
     _point_passes(scene, setup)
 
 
-def write_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
-    """Write what follows from a frame's spin and disk, both of which may be animated."""
-    if parameters.disk is not None:
-        write_geometry(scene, shot.active_hole(scene), parameters.spin, parameters.disk)
+def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
+    """Refuse a frame whose disk is not the one that the compositor draws.
+
+    Blender takes the compositor's values from before the frame; what is written while it renders comes too late.
+
+    Raises
+    ------
+    SceneError
+        The spin, from which the disk's place and its pattern follow, is animated.
+    """
+    hole = shot.active_hole(scene)
+    if parameters.disk is not None and write_geometry(scene, hole, parameters.spin, parameters.disk):
+        raise SceneError(
+            f'The spin of "{hole.name}" is animated, which its disk cannot follow within one render: remove the '
+            "keyframes, or render these frames one by one."
+        )
 
 
-def write_geometry(scene: bpy.types.Scene, hole: bpy.types.Object, spin: float, disk: "physics.Disk") -> None:
-    """Write edges, spin and the pattern's period into the sockets, and the profile into its table."""
+def write_geometry(scene: bpy.types.Scene, hole: bpy.types.Object, spin: float, disk: "physics.Disk") -> bool:
+    """Write edges, spin and the pattern's period into the sockets, and the profile into its table.
+
+    Returns whether anything was different before.
+    """
     setup = find_setup(scene)
     node = None if setup is None else find_node(setup.tree, DISK)
     if node is None:
-        return
+        return False
+    changed = False
     inner, outer = disk.radii(spin)
     values = {
         disk_group.IMAGES: float(disk.crossings),
@@ -78,11 +94,14 @@ def write_geometry(scene: bpy.types.Scene, hole: bpy.types.Object, spin: float, 
     for name, value in values.items():
         if not math.isclose(node.inputs[name].default_value, value, rel_tol=1e-6, abs_tol=1e-9):
             node.inputs[name].default_value = value
+            changed = True
     settings = hole.umbra.disk
     table = find_node(setup.tree, TABLE_ROLES[disk_group.PROFILE])
     image = disk_images.ensure_profile(settings.profile, settings.exponent, spin, inner, outer, disk.retrograde)
     if table.image != image:
         table.image = image
+    _follow_time(setup, node, hole, scene)
+    return changed
 
 
 # --- nodes ----------------------------------------------------------------------------------------
@@ -147,8 +166,11 @@ def _remove_drivers(tree: bpy.types.NodeTree, prefix: str) -> None:
 
 def _follow_settings(setup: Setup, node: bpy.types.Node, hole: bpy.types.Object, scene: bpy.types.Scene) -> None:
     settings = hole.umbra.disk
+    animated = _animated_paths(hole)
     for field, name in disk_group.LOOK_SOCKETS.items():
-        _drive(setup.tree, node.inputs[name], "a", {"a": (hole, f"umbra.disk.{field}")}, getattr(settings, field))
+        path = f"umbra.disk.{field}"
+        source = (hole, path) if path in animated else None
+        _set(setup.tree, node.inputs[name], getattr(settings, field), "a" if source else None, source)
     node.inputs[disk_group.BEAMING].default_value = disk_properties.BEAMINGS[settings.beaming]
     images = {
         disk_group.COLOURS: disk_images.ensure_colours(),
@@ -158,62 +180,72 @@ def _follow_settings(setup: Setup, node: bpy.types.Node, hole: bpy.types.Object,
         table = find_node(setup.tree, TABLE_ROLES[name])
         if table.image != image:
             table.image = image
-    # Time in patterns' lives, c; see `physics.disk_texture.pattern_shares`.
-    variables = {
-        "s": (hole, "umbra.disk.turning_speed"),
-        "f": (scene, "render.fps"),
-        "b": (scene, "render.fps_base"),
-    }
+
+
+def _follow_time(setup: Setup, node: bpy.types.Node, hole: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Let phase and turns of the patterns follow the frame; see `physics.disk_texture.pattern_shares`."""
+    settings = hole.umbra.disk
     period = node.inputs[disk_group.PERIOD].default_value
-    lives = f"(frame*s*b/f/{period:.9g})"
-    golden = repr(disk_texture.TURN_BETWEEN)
-    expressions = {
-        disk_group.PHASE: f"{lives}-floor{lives}",
-        disk_group.FIRST_TURN: _turn(f"2*floor{lives}", golden),
-        disk_group.SECOND_TURN: _turn(f"(2*floor({lives}+0.5)+1)", golden),
-    }
-    now = scene.frame_current * settings.turning_speed * scene.render.fps_base / scene.render.fps
-    (age, _, first), (_, _, second) = disk_texture.pattern_shares(now, period)
-    values = {disk_group.PHASE: age / period, disk_group.FIRST_TURN: first, disk_group.SECOND_TURN: second}
-    for name, expression in expressions.items():
-        _drive(setup.tree, node.inputs[name], expression, variables, values[name])
+    time_of_a_frame = settings.turning_speed * scene.render.fps_base / scene.render.fps
+    lives = f"(frame*{time_of_a_frame / period!r})"
+    (age, _, first), (_, _, second) = disk_texture.pattern_shares(scene.frame_current * time_of_a_frame, period)
+    for name, value, expression in (
+        (disk_group.PHASE, age / period, f"{lives}-floor{lives}"),
+        (disk_group.FIRST_TURN, first, _turn(f"2*floor{lives}")),
+        (disk_group.SECOND_TURN, second, _turn(f"(2*floor({lives}+0.5)+1)")),
+    ):
+        _set(setup.tree, node.inputs[name], value, expression)
 
 
-def _turn(number: str, golden: str) -> str:
+def _turn(number: str) -> str:
     """2 pi times the fraction of the number of a pattern times the golden section."""
-    return f"6.283185307179586*({number}*{golden}-floor({number}*{golden}))"
+    turns = f"{number}*{disk_texture.TURN_BETWEEN!r}"
+    return f"{2.0 * math.pi!r}*({turns}-floor({turns}))"
 
 
-def _drive(
+def _animated_paths(hole: bpy.types.Object) -> set[str]:
+    """The hole's properties that have keyframes or drivers; strips of other actions are left out."""
+    animation = hole.animation_data
+    if animation is None:
+        return set()
+    paths = {curve.data_path for curve in animation.drivers}
+    if animation.action is not None:
+        for layer in animation.action.layers:
+            for strip in layer.strips:
+                for bag in strip.channelbags:
+                    paths.update(curve.data_path for curve in bag.fcurves)
+    return paths
+
+
+def _set(
     tree: bpy.types.NodeTree,
     socket: bpy.types.NodeSocket,
-    expression: str,
-    variables: dict[str, tuple[bpy.types.ID, str]],
     value: float,
+    expression: str | None = None,
+    source: tuple[bpy.types.ID, str] | None = None,
 ) -> None:
-    """Let a socket follow an expression of properties, and give it the value of now."""
+    """Give a socket a value and, with an expression, a driver; the expression may use a property as `a`."""
     path = socket.path_from_id("default_value")
     present = tree.animation_data.drivers.find(path) if tree.animation_data is not None else None
-    if present is None or not _drives(present, expression, variables):
-        if present is not None:
-            tree.animation_data.drivers.remove(present)
+    if present is not None and not (expression is not None and _drives(present, expression, source)):
+        tree.animation_data.drivers.remove(present)
+        present = None
+    if present is None and expression is not None:
         driver = socket.driver_add("default_value").driver
         driver.type = "SCRIPTED"
-        for name, (owner, data_path) in variables.items():
+        if source is not None:
             variable = driver.variables.new()
-            variable.name = name
-            variable.targets[0].id_type = "SCENE" if isinstance(owner, bpy.types.Scene) else "OBJECT"
-            variable.targets[0].id = owner
-            variable.targets[0].data_path = data_path
+            variable.name = "a"
+            variable.targets[0].id, variable.targets[0].data_path = source
         driver.expression = expression
     if not math.isclose(socket.default_value, value, rel_tol=1e-6, abs_tol=1e-9):
         socket.default_value = value
 
 
-def _drives(curve: bpy.types.FCurve, expression: str, variables: dict[str, tuple[bpy.types.ID, str]]) -> bool:
+def _drives(curve: bpy.types.FCurve, expression: str, source: tuple[bpy.types.ID, str] | None) -> bool:
     driver = curve.driver
-    found = {each.name: (each.targets[0].id, each.targets[0].data_path) for each in driver.variables}
-    return driver.is_valid and driver.expression == expression and found == variables
+    found = [(each.targets[0].id, each.targets[0].data_path) for each in driver.variables]
+    return driver.is_valid and driver.expression == expression and found == ([] if source is None else [source])
 
 
 # --- passes ---------------------------------------------------------------------------------------

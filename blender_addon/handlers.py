@@ -75,6 +75,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if len(shot.holes(scene)) > 1:
         messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
     _guarded(sync.sync_sky, scene)
+    _guarded(disk_sync.refresh, scene)
 
 
 @persistent
@@ -148,7 +149,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
         for _fraction in baking.bake_map(path, parameters):
             pass
     _check_resolved(path, frame_shot)
-    disk_sync.write_shot(scene, parameters)
+    disk_sync.check_shot(scene, parameters)
     sync.point_at_maps(scene)
     _waiting.discard(scene.name)
 
