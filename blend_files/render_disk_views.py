@@ -33,9 +33,9 @@ class View:
 
 
 VIEWS = {
-    "disk_face_on": View(spin=0.7, distance=50.0, height=78.0, lens=35.0, outer=18.0, preset="PHYSICAL"),
+    "disk_face_on": View(spin=0.7, distance=50.0, height=78.0, lens=31.0, outer=18.0, preset="PHYSICAL", exposure=-0.6),
     "disk_ten_degrees": View(spin=0.6, distance=46.0, height=9.0, lens=38.0, outer=18.0, preset="GARGANTUA"),
-    "disk_close_up": View(spin=0.998, distance=10.0, height=9.0, lens=24.0, outer=14.0, preset="BLUE_HOT", exposure=-1.0),
+    "disk_close_up": View(spin=0.998, distance=13.0, height=8.0, lens=19.0, outer=12.0, preset="BLUE_HOT", exposure=-0.5),
 }
 
 
@@ -75,8 +75,6 @@ def main() -> None:
             scene.render.image_settings.file_format = "PNG"
             scene.cycles.samples = 1
             choose_denoiser(scene)
-            for thing in [each for each in scene.objects if each.name.startswith("Rock")]:
-                thing.hide_render = True
             for name, view in VIEWS.items():
                 render_view(name, view, out)
     except (RuntimeError, OSError, ImportError) as error:

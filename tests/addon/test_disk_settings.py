@@ -141,7 +141,9 @@ def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
     assert second.metadata["counts"]["rays"] == 0
 
 
-def test_switching_the_disk_off_takes_all_of_it_away(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
+def test_switching_the_disk_off_takes_all_of_it_away(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
     hole = add_hole(scene)
     setup = addon_module("compositor_tree").find_setup(scene)
     links, nodes = links_of(setup.tree), len(setup.tree.nodes)
