@@ -35,7 +35,9 @@ class View:
 VIEWS = {
     "disk_face_on": View(spin=0.7, distance=50.0, height=78.0, lens=31.0, outer=18.0, preset="PHYSICAL", exposure=-0.6),
     "disk_ten_degrees": View(spin=0.6, distance=46.0, height=9.0, lens=38.0, outer=18.0, preset="GARGANTUA"),
-    "disk_close_up": View(spin=0.998, distance=13.0, height=8.0, lens=19.0, outer=12.0, preset="BLUE_HOT", exposure=-0.5),
+    "disk_close_up": View(
+        spin=0.998, distance=13.0, height=8.0, lens=19.0, outer=12.0, preset="BLUE_HOT", exposure=-0.5
+    ),
 }
 
 
@@ -70,9 +72,10 @@ def main() -> None:
             bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "disk.blend"))
             scene = bpy.context.scene
             scene.umbra.map_folder = str(out / "warp_maps") + os.sep
-            scene.render.resolution_x, scene.render.resolution_y = size(sys.argv[2] if len(sys.argv) > 2 else "1600x900")
-            scene.render.resolution_percentage = 100
-            scene.render.image_settings.file_format = "PNG"
+            render = scene.render
+            render.resolution_x, render.resolution_y = size(sys.argv[2] if len(sys.argv) > 2 else "1600x900")
+            render.resolution_percentage = 100
+            render.image_settings.file_format = "PNG"
             scene.cycles.samples = 1
             choose_denoiser(scene)
             for name, view in VIEWS.items():

@@ -34,16 +34,16 @@ def profile(name: str, exponent: float, spin: float, inner: float, outer: float,
 
 
 def ensure_profile(
-    name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool
+    hole_name: str, name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool
 ) -> bpy.types.Image:
-    """The table of a disk's profile, as an image."""
+    """The table of the profile of a hole's disk, as an image; each hole has one of its own."""
     wanted = repr((name, exponent, spin, inner, outer, retrograde))
 
     def pixels() -> NDArray:
         flux = profile(name, exponent, spin, inner, outer, retrograde)
         return np.repeat(flux[:, None, None], 3, axis=2)
 
-    return _ensure(PROFILE_NAME, wanted, pixels)
+    return _ensure(f"{PROFILE_NAME} ({hole_name})", wanted, pixels)
 
 
 def ensure_colours() -> bpy.types.Image:
@@ -104,7 +104,6 @@ def _ensure(name: str, made_from: str, pixels: Callable[[], NDArray]) -> bpy.typ
 
 def remove_unused() -> None:
     """Remove those of the pictures that nothing uses any more."""
-    for name in (PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME):
-        image = bpy.data.images.get(name)
-        if image is not None and image.users == 0:
+    for image in list(bpy.data.images):
+        if image.name.startswith((PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME)) and image.users == 0:
             bpy.data.images.remove(image)

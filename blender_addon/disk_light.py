@@ -30,6 +30,8 @@ def find(hole: bpy.types.Object | None) -> bpy.types.Object | None:
 
 def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     """Add the light where the settings ask for it, bring it up to date, or remove it."""
+    for light in [each for each in scene.objects if MARK in each and (hole is None or each.parent != hole)]:
+        _remove(light)  # its hole is gone, or is not the one that is rendered
     if hole is None or hole.library is not None:
         return
     settings = hole.umbra.disk

@@ -124,6 +124,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         min=0.0,
         max=20.0,
         update=_changed,
+        options=set(),
     )
     temperature: bpy.props.FloatProperty(
         name="Temperature",

@@ -97,7 +97,9 @@ def write_geometry(scene: bpy.types.Scene, hole: bpy.types.Object, spin: float, 
             changed = True
     settings = hole.umbra.disk
     table = find_node(setup.tree, TABLE_ROLES[disk_group.PROFILE])
-    image = disk_images.ensure_profile(settings.profile, settings.exponent, spin, inner, outer, disk.retrograde)
+    image = disk_images.ensure_profile(
+        hole.name, settings.profile, settings.exponent, spin, inner, outer, disk.retrograde
+    )
     if table.image != image:
         table.image = image
     _follow_time(setup, node, hole, scene)

@@ -266,3 +266,32 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     expected = modules.disk_look.seen_colour(np.array([6500.0]))[0]
     # The disk fills all but the horizon of what the plate sees; 256 samples a pixel, twelve pixels.
     np.testing.assert_allclose(lit[:, :3].mean(axis=0), expected, rtol=0.05)
+
+
+def test_light_goes_with_its_hole(
+    scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
+) -> None:
+    hole.umbra.disk.light = True
+    assert addon_module("disk_light").find(hole) is not None
+    bpy.data.objects.remove(hole)
+    addon_module("disk_sync").refresh(scene)
+    assert not any("umbra_disk_light" in each for each in bpy.data.objects)
+    assert not addon_module("compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
+
+
+def test_holes_of_two_scenes_keep_tables_of_their_own(
+    scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
+) -> None:
+    other = bpy.data.scenes.new("Other")
+    second = bpy.data.objects.new("Second Hole", None)
+    other.collection.objects.link(second)
+    second.umbra.is_black_hole = True
+    second.umbra.spin = 0.1
+    other.umbra.active_hole = second
+    addon_module("compositing").set_up(other)
+    second.umbra.disk.enabled = True
+    find_setup, find_node = addon_module("compositor_tree").find_setup, addon_module("compositor_tree").find_node
+    tables = [find_node(find_setup(each).tree, "disk_profile").image for each in (scene, other)]
+    assert tables[0] != tables[1]
+    values = [list(each.pixels[:])[0::4] for each in tables]
+    assert values[0] != values[1]
