@@ -20,7 +20,7 @@ from pathlib import Path
 from scene_tools import addon, bpy
 
 FOLDER = Path(__file__).resolve().parent
-SCENES = ("station", "plinth")
+SCENES = ("station", "plinth", "disk")
 DEFAULT_FRAMES = (1, 36, 72)
 DEFAULT_SIZE = (960, 540)
 DEFAULT_SAMPLES = 48

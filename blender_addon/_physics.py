@@ -10,9 +10,52 @@ import importlib.util
 
 if importlib.util.find_spec(f"{__package__}.physics") is not None:
     from . import physics
-    from .physics import colour, exit_map, exit_map_file, exr, lens, metric, reference_render, star_sky
+    from .physics import (
+        colour,
+        disk_flux,
+        disk_look,
+        disk_render,
+        disk_texture,
+        exit_map,
+        exit_map_file,
+        exr,
+        lens,
+        metric,
+        orbiting_matter,
+        reference_render,
+        star_sky,
+    )
 else:
     import physics  # type: ignore[no-redef]
-    from physics import colour, exit_map, exit_map_file, exr, lens, metric, reference_render, star_sky  # type: ignore[no-redef]
+    from physics import (  # type: ignore[no-redef]
+        colour,
+        disk_flux,
+        disk_look,
+        disk_render,
+        disk_texture,
+        exit_map,
+        exit_map_file,
+        exr,
+        lens,
+        metric,
+        orbiting_matter,
+        reference_render,
+        star_sky,
+    )
 
-__all__ = ["colour", "exit_map", "exit_map_file", "exr", "lens", "metric", "physics", "reference_render", "star_sky"]
+__all__ = [
+    "colour",
+    "disk_flux",
+    "disk_look",
+    "disk_render",
+    "disk_texture",
+    "exit_map",
+    "exit_map_file",
+    "exr",
+    "lens",
+    "metric",
+    "orbiting_matter",
+    "physics",
+    "reference_render",
+    "star_sky",
+]

@@ -83,7 +83,7 @@ def _steps(
     path: Path, parameters: "physics.WarpMapParameters"
 ) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
     """Bake a map of the kind that its path says, once it is sure that it can be written."""
-    maps.prepare(path, parameters.map_size)
+    maps.prepare(path, parameters.map_size, 1 + len(maps.pass_paths(path, parameters)))
     if maps.kind_of(path) is maps.EXIT_MAP:
         return (yield from exit_map.bake_exit_map_steps(parameters))
     return (yield from _baker.steps(parameters))
@@ -92,11 +92,18 @@ def _steps(
 def _save(path: Path, baked: "physics.WarpMap | exit_map.ExitMap") -> None:
     """Write a map of either kind; this may run in a thread of its own, and touches nothing of Blender's."""
     if not isinstance(baked, exit_map.ExitMap):
-        physics.write_warp_map(path, baked)
+        _write_all(path, baked)
         return
     exit_map_file.write_exit_map(path, baked)
     for older in maps.older_exit_maps(path):
         older.unlink(missing_ok=True)
+
+
+def _write_all(path: Path, warp_map: "physics.WarpMap") -> None:
+    """Write a map and its disk's passes; the map comes last, so that where it holds they are there."""
+    for one in warp_map.disk_passes:
+        physics.write_disk_pass(maps.pass_path(path, one.metadata["crossing"]), one)
+    physics.write_warp_map(path, warp_map)
 
 
 def forget_shared_rays() -> None:

@@ -7,7 +7,7 @@ What must be known to undo that lies in custom properties, so that it is saved w
 
 import bpy
 
-from . import node_group
+from . import disk_sync, node_group
 from .compositor_tree import (
     GROUP,
     MAP,
@@ -16,6 +16,7 @@ from .compositor_tree import (
     ROLE,
     SKY,
     find_node,
+    find_setup,
     find_tree,
     has_scene_tree,
     render_layers,
@@ -241,7 +242,7 @@ def remove(scene: bpy.types.Scene) -> None:
     before = dict(scene[BEFORE]) if BEFORE in scene else {}
     if tree is not None:
         tree_is_new = bool(before.get("tree_is_new"))
-        _unlink(tree, tree_is_new=tree_is_new)
+        _unlink(scene, tree, tree_is_new=tree_is_new)
         if tree_is_new and all(node.get(ROLE) for node in tree.nodes):
             remove_tree(scene, tree)
         else:
@@ -258,8 +259,11 @@ def remove(scene: bpy.types.Scene) -> None:
         del scene[BEFORE]
 
 
-def _unlink(tree: bpy.types.NodeTree, *, tree_is_new: bool) -> None:
+def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bool) -> None:
     """Give the render's picture back to whatever the group's feeds, and remove our nodes."""
+    setup = find_setup(scene)
+    if setup is not None:
+        disk_sync.remove(setup)
     group = find_node(tree, GROUP)
     if group is not None:
         _give_back(tree, group)

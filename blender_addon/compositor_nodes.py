@@ -37,6 +37,7 @@ class GroupInputs:
     redshift_colour: Socket
     redshift_brightness: Socket
     temperature: Socket
+    disk: Socket
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
     with builder.frame("Direction in the environment"):
         u, v = _texture_coordinates(builder, channels, inputs.rotation)
     with builder.frame("Environment"):
-        environment = _sample_environment(builder, inputs.environment, u, v)
+        environment = sample_bilinearly(builder, inputs.environment, u, v)
     with builder.frame("Redshift"):
         gain = _redshift_gain(builder, channels.one_plus_z, inputs)
     with builder.frame("Sky"):
@@ -99,9 +100,9 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
         sky = builder.select_vector(channels.valid, reference_render.MAGENTA, sky, "Magenta if invalid")
         data = builder.combine(channels.visibility, channels.one_plus_z, channels.valid)
     with builder.frame("To the render's size"):
-        sky, data = _to_render_size(builder, sky, data)
+        sky, data = to_render_size(builder, sky, data)
     with builder.frame("Picture"):
-        return _compose(builder, inputs.render, sky, data)
+        return _compose(builder, inputs, sky, data)
 
 
 def _read_map(builder: TreeBuilder, warp_map: Value) -> _MapChannels:
@@ -184,7 +185,7 @@ def _split_angle(builder: TreeBuilder, angle: Value) -> _Angle:
     return _Angle(eighths, rest)
 
 
-def _sample_environment(builder: TreeBuilder, environment: Value, u: Socket, v: Socket) -> Socket:
+def sample_bilinearly(builder: TreeBuilder, environment: Value, u: Value, v: Value) -> Socket:
     """Bilinear look-up that wraps round in u and extends the first and last row in v."""
     if SETTINGS_ARE_SOCKETS:
         return builder.map_uv(environment, builder.combine(u, v, 1.0), "Bilinear")
@@ -249,8 +250,8 @@ def _log_of_planck_term(builder: TreeBuilder, value: Socket) -> Socket:
     return _natural_log(builder, builder.math("MULTIPLY", tangent, builder.math("ADD", 1.0, decay)))
 
 
-def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[Socket, Socket]:
-    """Bring two images of the map's size to the render's size.
+def to_render_size(builder: TreeBuilder, *images: Socket) -> tuple[Socket, ...]:
+    """Bring images of the map's size to the render's size; vectors, of which the last one is asked for the size.
 
     A map of 2, 4 or 8 times the render's size is box-filtered exactly, one halving after the other: four
     nearest pixels added up, because a bilinear sample between four pixels, which ought to be the same, is
@@ -260,7 +261,7 @@ def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[So
     area = builder.render_area("The render's pixels")
     area_width, area_height = builder.image_size(area)
     for _ in range(_HALVINGS):
-        width, _height = builder.image_size(data)
+        width, _height = builder.image_size(images[-1])
         halve = builder.math(
             "GREATER_THAN",
             builder.math("DIVIDE", width, area_width),
@@ -272,8 +273,8 @@ def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[So
         back = builder.math("MULTIPLY", step, -1.0)
         # An image of zeros in the halved size: being the first operand it makes Blender sample the others
         # there. (Two scalings in a row without arithmetic in between would merge into one.)
-        grid = builder.vector_scale(builder.scale_by(data, factor), 0.0)
-        sky, data = (
+        grid = builder.vector_scale(builder.scale_by(images[-1], factor), 0.0)
+        images = tuple(
             _mean_of_four(
                 builder,
                 grid,
@@ -283,10 +284,10 @@ def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[So
                     for y in (back, step)
                 ],
             )
-            for image in (sky, data)
+            for image in images
         )
 
-    width, height = builder.image_size(data)
+    width, height = builder.image_size(images[-1])
     double = builder.math(
         "MULTIPLY",
         builder.math("COMPARE", width, builder.math("MULTIPLY", 2.0, area_width), 0.1),
@@ -294,9 +295,8 @@ def _to_render_size(builder: TreeBuilder, sky: Socket, data: Socket) -> tuple[So
         label="Exactly twice?",
     )
     shifts = (_centring(builder, width, area_width), _centring(builder, height, area_height))
-    coverage = None if SETTINGS_ARE_SOCKETS else _coverage(builder, data, area, shifts)
-    sky, data = (_last_step(builder, image, area, double, shifts, coverage) for image in (sky, data))
-    return sky, data
+    coverage = None if SETTINGS_ARE_SOCKETS else _coverage(builder, images[-1], area, shifts)
+    return tuple(_last_step(builder, image, area, double, shifts, coverage) for image in images)
 
 
 def _coverage(builder: TreeBuilder, image: Socket, area: Socket, shifts: tuple[Socket, Socket]) -> Socket:
@@ -351,11 +351,13 @@ def _mean_of_four(builder: TreeBuilder, grid: Socket, images: list[Socket]) -> S
     return builder.vector_scale(total, 0.25)
 
 
-def _compose(builder: TreeBuilder, render: Value, sky: Socket, data: Socket) -> GroupOutputs:
-    """Render over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames."""
+def _compose(builder: TreeBuilder, inputs: GroupInputs, sky: Socket, data: Socket) -> GroupOutputs:
+    """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames."""
     visibility, one_plus_z, valid = builder.separate(data)
-    _, _, _, alpha = builder.separate_colour(render)
-    image = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, alpha), render)
+    _, _, _, covered = builder.separate_colour(inputs.disk)
+    sky = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, covered), inputs.disk)
+    _, _, _, alpha = builder.separate_colour(inputs.render)
+    image = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, alpha), inputs.render)
     image = builder.select_vector(valid, reference_render.MAGENTA, image, "Magenta if invalid")
     return GroupOutputs(
         image=image,

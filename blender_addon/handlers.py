@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, lens_render, lens_sync, maps, messages, node_group, shot, sync
+from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, shot, sync
 from ._physics import physics
 from .compositor_tree import check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -84,6 +84,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
     _guarded(sync.sync_sky, scene)
+    _guarded(disk_sync.refresh, scene)
 
 
 @persistent
@@ -179,6 +180,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     path = baking.path_of(scene, frame_shot)
     baking.provide_map(scene, path, parameters, frame_shot.frame)
     _check_resolved(path, frame_shot)
+    disk_sync.check_shot(scene, parameters)
     sync.point_at_maps(scene)
     _waiting.discard(scene.name)
 

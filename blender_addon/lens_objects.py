@@ -62,9 +62,13 @@ def _distance(matrix: np.ndarray, low: np.ndarray, high: np.ndarray, point: np.n
 
 
 def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Shot) -> list[str]:
-    """Sentences about objects that the picture lacks."""
+    """Sentences about what the picture lacks."""
     found = place(scene, depsgraph, frame)
     sentences = []
+    if frame.parameters.disk is not None:
+        sentences.append(
+            f'The disk of "{frame.hole_name}" is drawn by the compositor alone: choose Output: Compositor to see it.'
+        )
     if found.inside:
         radius = scene.umbra.sphere_radius
         sentences.append(

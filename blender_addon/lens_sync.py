@@ -30,8 +30,11 @@ def uses_maps(scene: bpy.types.Scene) -> bool:
 
 
 def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
-    """What an exit map is made from: lines in the hole's frame do not depend on how that stands in the world."""
-    return replace(parameters, hole_to_world=physics.IDENTITY)
+    """What an exit map is made from: lines in the hole's frame do not depend on how that stands in the world.
+
+    A disk has no part in it: the compositor draws that.
+    """
+    return replace(parameters, hole_to_world=physics.IDENTITY, disk=None)
 
 
 def values_of(scene: bpy.types.Scene, frame: shot.Shot, map_path: Path | None = None) -> dict[str, object]:

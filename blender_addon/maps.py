@@ -131,13 +131,25 @@ def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, in
     return folder(scene).blender_path + file_name(scene, hole_name, size, frame)
 
 
+def pass_path(path: "Path | str", crossing: int) -> str:
+    """Where a disk's pass lies: beside its map, _disk1 before the frame's number for the first crossing."""
+    beginning, _, end = str(path).rpartition("_")
+    return f"{beginning}_disk{crossing}_{end}"
+
+
+def pass_paths(path: Path, parameters: "physics.WarpMapParameters") -> list[Path]:
+    """Where all passes of a map lie; none if it has no disk."""
+    crossings = 0 if parameters.disk is None else parameters.disk.crossings
+    return [Path(pass_path(path, crossing)) for crossing in range(1, crossings + 1)]
+
+
 def is_fresh(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> bool:
     """Whether a map exists and was made by exactly these parameters; a damaged or foreign one is not."""
     return fault_of(path, parameters, thorough=thorough) is None
 
 
 def fault_of(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> str | None:
-    """What is wrong with a map as the beginning of a sentence, or None if it holds.
+    """What is wrong with a map or a disk's pass as the beginning of a sentence, or None if all hold.
 
     Thorough: its pixels are read and checked too (some 0.1 s in full HD); otherwise the header is taken at its word.
     """
@@ -150,6 +162,11 @@ def fault_of(path: Path, parameters: "physics.WarpMapParameters", *, thorough: b
             return f"The {kind.noun} {path} is out of date"
         if thorough:
             kind.read(path)
+        for one in pass_paths(path, parameters):
+            if not one.is_file():
+                return f"The disk's pass {one} is missing"
+            if thorough and physics.read_disk_pass(one).metadata["hash"] != parameters.hash:
+                return f"The disk's pass {one} is out of date"
     except physics.WarpMapError as error:
         return str(error).removesuffix("; bake it again.")
     return None
@@ -170,8 +187,8 @@ def count_baked(
     return sum(frame % SEQUENCE_LENGTH in numbers for frame in frames)
 
 
-def prepare(path: Path, size: tuple[int, int]) -> None:
-    """Make sure, before any work is done, that a map of this size can be written there.
+def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:
+    """Make sure, before any work is done, that a map of this size can be written there, with its passes.
 
     Raises
     ------
@@ -186,7 +203,7 @@ def prepare(path: Path, size: tuple[int, int]) -> None:
         free = shutil.disk_usage(parent).free
     except OSError as error:
         raise explain(error, parent) from error
-    needed = size[0] * size[1] * BYTES_PER_PIXEL
+    needed = size[0] * size[1] * BYTES_PER_PIXEL * files
     if free < needed:
         raise MapFolderError(
             f"The disk of the warp map folder {parent} is full: {free / 1e6:.0f} MB are free, a map needs up "

@@ -15,6 +15,8 @@ Warp Map
     An Image node with the baked EXR, a single image or a sequence. The image must be Non-Color
     (`image.colorspace_settings.name`) and Channel Packed (`image.alpha_mode = "CHANNEL_PACKED"`). Its
     size is the render's, or 2 or 4 times that. No other node may lie in between.
+Disk
+    The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. Unlinked there is none.
 Environment Rotation, Environment Strength
     What the World's Mapping node (type Point) and its Background node say.
 
@@ -26,44 +28,18 @@ Everything in here works on Blender's data alone, without operators or context.
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass, fields
-
 import bpy
 
 from . import compositor_nodes
 from ._physics import colour
-from .node_helpers import SETTINGS_ARE_SOCKETS, TreeBuilder
+from .node_helpers import Socket, TreeBuilder
+from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 1
+GROUP_VERSION = 2
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
-BLENDER_KEY = "umbra_built_with_blender"
-CONTENT_KEY = "umbra_content"
-
-TREE_TYPE = "CompositorNodeTree"
-GROUP_NODE_TYPE = "CompositorNodeGroup"
-
-FORMER_NAMES: dict[tuple[str, str], str] = {}
-"""(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
-
-
-@dataclass(frozen=True)
-class SocketSpec:
-    """A socket of the group as the artist sees it."""
-
-    name: str
-    socket_type: str
-    description: str
-    in_out: str = "INPUT"
-    default: float | tuple[float, ...] | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    subtype: str = "NONE"
-    hide_value: bool = False
-
 
 RENDER = SocketSpec(
     "Render",
@@ -137,8 +113,15 @@ TEMPERATURE = SocketSpec(
     maximum=40000.0,
     subtype="COLOR_TEMPERATURE",
 )
+DISK = SocketSpec(
+    "Disk",
+    "NodeSocketColor",
+    "The accretion disk of the node group Umbra Disk, premultiplied: in front of the sky and behind the scene",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
 IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
-SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole and the sky without the scene", in_out="OUTPUT")
+SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole, its disk and the sky without the scene", in_out="OUTPUT")
 SHADOW = SocketSpec(
     "Shadow", "NodeSocketFloat", "Mask of the black hole's shadow: 1 inside, 0 outside", in_out="OUTPUT"
 )
@@ -159,74 +142,12 @@ INPUTS = (
     REDSHIFT_COLOUR,
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
+    DISK,
 )
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
-def is_group(tree: bpy.types.NodeTree | None) -> bool:
-    """Whether a node tree is this group, of whatever version, whole or damaged."""
-    return tree is not None and tree.bl_idname == TREE_TYPE and VERSION_KEY in tree
-
-
-def is_current(tree: bpy.types.NodeTree) -> bool:
-    """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
-    return (
-        tree.get(VERSION_KEY) == GROUP_VERSION
-        and tree.get(BLENDER_KEY) == _blender_series()
-        and tree.get(CONTENT_KEY) == _fingerprint(tree)
-    )
-
-
-def find_group() -> bpy.types.NodeTree | None:
-    """The group in this file, or None. One linked from another file is left out: it cannot be repaired."""
-    groups = [tree for tree in bpy.data.node_groups if is_group(tree) and tree.library is None]
-    return next((tree for tree in groups if tree.name == GROUP_NAME), groups[0] if groups else None)
-
-
-def ensure_group() -> bpy.types.NodeTree:
-    """The group, whole and of this version.
-
-    Returns
-    -------
-    bpy.types.NodeTree
-        Built anew if the file has none. One of another version, from another version of Blender, or with
-        changes inside is rebuilt in place: group nodes that use it keep their values and links, as far as
-        their sockets still exist.
-    """
-    tree = find_group()
-    if tree is None:
-        tree = bpy.data.node_groups.new(GROUP_NAME, TREE_TYPE)
-    if not is_current(tree):
-        _rebuild(tree)
-    return tree
-
-
-def add_group_node(tree: bpy.types.NodeTree) -> bpy.types.Node:
-    """Add a group node that uses the group to a compositor tree; `INPUTS` and `OUTPUTS` name its sockets."""
-    node = tree.nodes.new(GROUP_NODE_TYPE)
-    node.node_tree = ensure_group()
-    node.name = node.label = GROUP_NAME
-    node.width = 220.0
-    return node
-
-
-def group_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
-    """All group nodes in a compositor tree (not in groups inside of it) that use the group."""
-    return [node for node in tree.nodes if node.bl_idname == GROUP_NODE_TYPE and is_group(node.node_tree)]
-
-
-def _blender_series() -> str:
-    """Nodes are written differently by each series, and Blender converts old files upward only."""
-    return f"{bpy.app.version[0]}.{bpy.app.version[1]}"
-
-
-def _rebuild(tree: bpy.types.NodeTree) -> None:
-    tree.nodes.clear()
-    for spec in _match_interface(tree):
-        _set_default_in_users(tree, spec)
-    builder = TreeBuilder(tree)
-    group_input = builder.node("NodeGroupInput")
-    sockets = {socket.name: socket for socket in group_input.outputs}
+def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
     inputs = compositor_nodes.GroupInputs(
         render=sockets[RENDER.name],
         environment=sockets[ENVIRONMENT.name],
@@ -237,99 +158,26 @@ def _rebuild(tree: bpy.types.NodeTree) -> None:
         redshift_colour=sockets[REDSHIFT_COLOUR.name],
         redshift_brightness=sockets[REDSHIFT_BRIGHTNESS.name],
         temperature=sockets[TEMPERATURE.name],
+        disk=sockets[DISK.name],
     )
     results = compositor_nodes.build(builder, inputs)
-    group_output = builder.node("NodeGroupOutput")
-    targets = {socket.name: socket for socket in group_output.inputs}
-    for spec, field in zip(OUTPUTS, fields(results), strict=True):
-        tree.links.new(getattr(results, field.name), targets[spec.name])
-    tree[VERSION_KEY] = GROUP_VERSION
-    tree[BLENDER_KEY] = _blender_series()
-    tree[CONTENT_KEY] = _fingerprint(tree)
+    return {
+        IMAGE.name: results.image,
+        SKY.name: results.sky,
+        SHADOW.name: results.shadow,
+        REDSHIFT.name: results.redshift,
+    }
 
 
-def _match_interface(tree: bpy.types.NodeTree) -> list[SocketSpec]:
-    """Make the sockets what they should be, keeping those that exist: values and links hang on them.
+_GROUP = StampedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
 
-    Returns the inputs that did not exist before.
-    """
-    interface = tree.interface
-    wanted = {(spec.in_out, spec.name): spec for spec in (*OUTPUTS, *INPUTS)}
-    kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
-    for item in list(interface.items_tree):
-        if item.item_type == "SOCKET":
-            key = (item.in_out, FORMER_NAMES.get((item.in_out, item.name), item.name))
-            if key in wanted and key not in kept and item.socket_type == wanted[key].socket_type:
-                kept[key] = item
-    survivors = set(kept.values())
-    for item in [item for item in interface.items_tree if item not in survivors]:
-        interface.remove(item)
-    added = []
-    for position, (key, spec) in enumerate(wanted.items()):
-        item = kept.get(key)
-        if item is None:
-            item = interface.new_socket(spec.name, in_out=spec.in_out, socket_type=spec.socket_type)
-            added.append(spec)
-        _describe(item, spec)
-        interface.move(item, position)
-    return [spec for spec in added if spec.in_out == "INPUT"]
+is_group = _GROUP.owns
+is_current = _GROUP.is_current
+find_group = _GROUP.find
+ensure_group = _GROUP.ensure
+add_group_node = _GROUP.add_node
 
 
-def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
-    """Give a new input its default in existing group nodes, where Blender made it before it had one."""
-    users = list(bpy.data.node_groups)
-    if not SETTINGS_ARE_SOCKETS:
-        users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
-    for user in users:
-        for node in user.nodes:
-            if node.bl_idname == GROUP_NODE_TYPE and node.node_tree == tree:
-                node.inputs[spec.name].default_value = spec.default
-
-
-def _describe(item: bpy.types.NodeTreeInterfaceSocket, spec: SocketSpec) -> None:
-    item.name = spec.name
-    item.description = spec.description
-    item.hide_value = spec.hide_value
-    if spec.socket_type != "NodeSocketColor" and item.subtype != spec.subtype:
-        item.subtype = spec.subtype
-    if spec.minimum is not None:
-        item.min_value = spec.minimum
-    if spec.maximum is not None:
-        item.max_value = spec.maximum
-    if spec.default is not None:
-        item.default_value = spec.default
-
-
-def _fingerprint(tree: bpy.types.NodeTree) -> str:
-    """Hash of all that decides what the group does; the places and names of nodes are left out."""
-    order = {node: index for index, node in enumerate(tree.nodes)}
-    lines = [_interface_line(item) for item in tree.interface.items_tree]
-    for node, index in order.items():
-        settings = [
-            f"{name}={getattr(node, name)}"
-            for name in sorted(property_.identifier for property_ in node.bl_rna.properties)
-            if name not in bpy.types.Node.bl_rna.properties and isinstance(getattr(node, name), str | bool)
-        ]
-        values = [_value_text(socket) for socket in node.inputs if not socket.is_linked]
-        lines.append(f"{index} {node.bl_idname} mute={node.mute} {settings} {values}")
-    lines.extend(
-        sorted(
-            f"{order[link.from_node]}:{link.from_socket.identifier}>{order[link.to_node]}:{link.to_socket.identifier}"
-            for link in tree.links
-        )
-    )
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
-
-
-def _interface_line(item: bpy.types.NodeTreeInterfaceItem) -> str:
-    if item.item_type != "SOCKET":
-        return item.item_type
-    details = [getattr(item, name, "") for name in ("description", "subtype", "min_value", "max_value", "hide_value")]
-    return f"{item.in_out} {item.name} {item.identifier} {item.socket_type} {details}"
-
-
-def _value_text(socket: bpy.types.NodeSocket) -> str:
-    value = getattr(socket, "default_value", None)
-    if value is None or isinstance(value, str | bool | int | float):
-        return f"{socket.identifier}={value!r}"
-    return f"{socket.identifier}={[float(component) for component in value]}"
+def group_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
+    """All group nodes in a compositor tree (not in groups inside of it) that use the group."""
+    return [node for node in tree.nodes if node.bl_idname == GROUP_NODE_TYPE and is_group(node.node_tree)]

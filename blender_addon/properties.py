@@ -3,6 +3,7 @@
 
 import bpy
 
+from . import disk_properties
 from ._physics import colour, lens, metric, physics
 
 # physics accepts spins up to this; a hole spinning the other way is the object turned over.
@@ -50,6 +51,10 @@ def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
     hole = settings.id_data
     if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
         hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
+    if settings.disk.enabled:  # its innermost orbit depends on the spin, and its light on the size
+        from . import disk_sync  # it reads these properties, hence not at the top
+
+        disk_sync.refresh_hole(hole)
 
 
 class UmbraHoleProperties(bpy.types.PropertyGroup):
@@ -126,6 +131,7 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
         precision=3,
         update=_changed,
     )
+    disk: bpy.props.PointerProperty(type=disk_properties.UmbraDiskProperties)
 
 
 def _is_hole(_settings: object, candidate: bpy.types.Object) -> bool:
@@ -339,7 +345,7 @@ def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:
     return ACCURACIES.get(settings.quality, (settings.tolerance, settings.interpolation))
 
 
-CLASSES = (UmbraHoleProperties, UmbraSceneProperties)
+CLASSES = (*disk_properties.CLASSES, UmbraHoleProperties, UmbraSceneProperties)
 
 
 def register() -> None:

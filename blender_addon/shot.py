@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._physics import physics
+from .disk_properties import disk_of
 from .errors import SceneError
 from .lens_camera import original_type
 from .properties import CAMERA_ANIMATION, CYCLES_LENS, MOTIONS, tolerances_of
@@ -368,6 +369,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
         tolerance=tolerance,
         method=settings.method,
         interpolation=interpolation,
+        disk=disk_of(hole_settings.disk),
     )
     parameters.validate()
     data = evaluated_camera.data

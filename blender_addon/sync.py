@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import environment, maps, shot
+from . import disk_sync, environment, maps, shot
 from .compositor_tree import Setup, find_setup
 from .errors import SceneError
 
@@ -19,6 +19,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     setup = find_setup(scene)
     if setup is None:
         return
+    disk_sync.refresh(scene)
     try:
         point_at_maps(scene)
     except SceneError as error:
@@ -31,8 +32,8 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
             notes.append(str(error))
 
 
-def _map_image() -> bpy.types.Image:
-    image = bpy.data.images.new(MAP_IMAGE_NAME, 1, 1, float_buffer=True)
+def _map_image(name: str) -> bpy.types.Image:
+    image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP
     image.colorspace_settings.name = "Non-Color"
@@ -71,9 +72,20 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
     setup = find_setup(scene)
     if setup is None or setup.map is None:
         return
-    node = setup.map
+    _read_sequence(setup.map, MAP_IMAGE_NAME, path)
+    point_passes(setup, path)
+
+
+def point_passes(setup: Setup, path: str) -> None:
+    """Let the disk's passes be read from beside the map."""
+    for node, crossing in disk_sync.passes_of(setup):
+        _read_sequence(node, f"Umbra Disk Pass {crossing}", maps.pass_path(path, crossing))
+
+
+def _read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
+    """Let an image node read one file for each frame."""
     if node.image is None or node.image.source != "SEQUENCE":
-        node.image = _map_image()
+        node.image = _map_image(name)
     wanted = {
         # together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see maps.py
         "frame_duration": maps.SEQUENCE_LENGTH,
@@ -94,6 +106,8 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
     setup = find_setup(scene)
     if setup is not None and setup.map is not None and setup.map.image is not None:
         setup.map.image.reload()
+        for node, _crossing in disk_sync.passes_of(setup):
+            node.image.reload()
 
 
 def takes_sky_from_settings(setup: Setup) -> bool:

@@ -51,6 +51,7 @@ def test_sockets_are_complete_described_and_in_order(node_group: ModuleType) -> 
         "Redshift Colour",
         "Redshift Brightness",
         "Sky Temperature",
+        "Disk",
     ]
     assert [item.name for item in outputs] == ["Image", "Sky", "Shadow", "Redshift"]
     assert all(len(item.description) > 20 for item in inputs + outputs)

@@ -18,6 +18,7 @@ BLEND_FILES = Path(__file__).resolve().parents[2] / "blend_files"
 SIZE = (160, 90)
 FRAME = 40
 SCENES = ("station", "plinth")
+WITH_DISK = ("disk",)  # its picture glows, and is compared with numpy in the tests of the add-on
 
 # Differences from the reference, as shares of the pixel's value. The compositor computes in float32, so it finds its
 # place in a panorama 4096 wide to about 1e-3 texel: beside a star that is a noticeable share of a pixel's value.
@@ -125,6 +126,7 @@ def test_hole_and_objects_are_both_in_the_picture(rendered: Rendered) -> None:
     assert not np.any((red == 1.0) & (green == 0.0) & (blue == 1.0))
 
 
+@pytest.mark.parametrize("scene", [*SCENES, *WITH_DISK], indirect=True)
 def test_camera_moves_for_two_seconds_and_more(scene: object, addon_module: Callable[[str], ModuleType]) -> None:
     read_at = addon_module("shot").read_at
     frames = range(scene.frame_start, scene.frame_end + 1, 6)
@@ -135,6 +137,7 @@ def test_camera_moves_for_two_seconds_and_more(scene: object, addon_module: Call
     assert np.all(steps < 0.05 * np.linalg.norm(places[0])), "a slow move"
 
 
+@pytest.mark.parametrize("scene", [*SCENES, *WITH_DISK], indirect=True)
 def test_file_stands_alone(scene: object, tmp_path: Path) -> None:
     """Everything is packed, and no path of the computer that built it is left, not even in the file browser."""
     import bpy
@@ -148,3 +151,20 @@ def test_file_stands_alone(scene: object, tmp_path: Path) -> None:
     found = {each for each in MACHINE_PATH.findall(copy.read_bytes()) if str(tmp_path).encode() not in each}
     assert not found
     assert (BLEND_FILES / bpy.path.basename(bpy.data.filepath)).stat().st_size < 8_000_000
+
+
+@pytest.mark.parametrize("scene", WITH_DISK, indirect=True)
+def test_orbit_with_a_disk_shares_its_rays(
+    scene: object, addon_module: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    """Only the first frame is traced; the disk is in the picture, and bright."""
+    import bpy
+
+    scene.frame_end = 2
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    first, second = sorted(path for path in (tmp_path / "maps").glob("*.exr") if "_disk" not in path.name)
+    assert read_warp_map(first).metadata["counts"]["rays"] > 0
+    assert read_warp_map(second).metadata["counts"]["rays"] == 0
+    assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == 6
+    picture = _render(scene, tmp_path / "picture.exr")
+    assert np.mean(picture[..., :3].max(axis=-1) > 0.5) > 0.1

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is inside the node group "Umbra Disk": from a map's disk passes to a premultiplied picture, in float32.
+
+The same picture as `physics.disk_render` in float64, term by term, with two tables instead of closed forms: the
+profile of the flux over the radius, and the colours of black bodies over the temperature (see `disk_images`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ._physics import disk_look, reference_render
+from .compositor_nodes import sample_bilinearly, to_render_size
+from .node_helpers import Socket, TreeBuilder, Value
+
+PASSES = 3
+"""How many images of the disk the group can draw."""
+
+# Below this, matter is too redshifted to be seen; where there is no disk, passes hold 0, and logarithms end here.
+_SMALLEST_G = 1e-6
+_SMALLEST_FLUX = 1e-6
+_SMALLEST_SOFTNESS = 1e-3
+
+_LOWEST, _HIGHEST = math.log(disk_look.COLDEST), math.log(disk_look.HOTTEST)
+
+
+@dataclass(frozen=True)
+class DiskInputs:
+    """Output sockets of the Group Input node; what they mean is said where they are declared, in `disk_group`."""
+
+    passes: tuple[Socket, ...]
+    images: Socket
+    profile: Socket
+    colours: Socket
+    texture: Socket
+    phase: Socket
+    first_turn: Socket
+    second_turn: Socket
+    period: Socket
+    spin: Socket
+    direction: Socket
+    inner: Socket
+    outer: Socket
+    temperature: Socket
+    doppler_colour: Socket
+    doppler_brightness: Socket
+    beaming: Socket
+    colour_variation: Socket
+    falloff: Socket
+    exposure: Socket
+    opacity: Socket
+    streaks: Socket
+    clumps: Socket
+    inner_softness: Socket
+    outer_softness: Socket
+    gain: Socket
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What is the same for every pixel, worked out once."""
+
+    log_inner: Socket
+    log_width: Socket
+    """ln(outer / inner)."""
+    patterns: tuple[tuple[Socket, Socket, Socket], ...]
+    """Age, share of the contrast, and turn of the two patterns of the texture."""
+    brightness_power: Socket
+    temperature_power: Socket
+    brightness: Socket
+    profile_rows: Socket
+    colour_rows: Socket
+
+
+def build(builder: TreeBuilder, inputs: DiskInputs) -> Socket:
+    """Add all nodes between the group's inputs and its output, the disk as it is seen, of the render's size.
+
+    A pass that ought to be there and is not makes all of the picture magenta.
+    """
+    with builder.frame("Once for all pixels"):
+        shared = _share(builder, inputs)
+    light: Value | None = None
+    through: Value = 1.0
+    for number, one in enumerate(inputs.passes, start=1):
+        with builder.frame(f"Image {number}: place"):
+            radius, phi, g, coverage = builder.separate_colour(one)
+            depth = _depth(builder, inputs, shared, radius)
+        with builder.frame(f"Image {number}: streaks and clumps"):
+            streaks, clumps = _moving_texture(builder, inputs, shared, (radius, phi, depth, coverage))
+            thick = _density(builder, inputs, depth, streaks, clumps)
+        with builder.frame(f"Image {number}: light"):
+            colour = _emission(builder, inputs, shared, depth, g)
+            colour = builder.vector_scale(
+                colour, builder.math("POWER", thick, builder.math("SUBTRACT", inputs.gain, 1.0))
+            )
+        with builder.frame(f"Image {number}: in front of what is behind"):
+            full = builder.math("MINIMUM", 1.0, builder.math("MULTIPLY", thick, disk_look.OPACITY_REACH))
+            alpha = builder.math("MULTIPLY", builder.math("MULTIPLY", full, inputs.opacity), coverage)
+            share = builder.math("MULTIPLY", alpha, through)
+            seen = builder.vector_scale(colour, share)
+            light = seen if light is None else builder.vector_math("ADD", light, seen)
+            through = builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, alpha), through)
+    with builder.frame("Are all passes there?"):
+        whole = _all_there(builder, inputs)
+    with builder.frame("To the render's size"):
+        covered = builder.math("SUBTRACT", 1.0, through)
+        light, alphas = to_render_size(builder, light, builder.combine(covered, covered, covered))
+    with builder.frame("Picture"):
+        red, green, blue = builder.separate(
+            builder.select_vector(whole, reference_render.MAGENTA, light, "Magenta if a pass is missing")
+        )
+        alpha, _, _ = builder.separate(alphas)
+        return builder.combine_colour(red, green, blue, builder.select(whole, 1.0, alpha))
+
+
+def _share(builder: TreeBuilder, inputs: DiskInputs) -> _Shared:
+    log_inner = builder.math("LOGARITHM", inputs.inner, math.e)
+    log_width = builder.math("SUBTRACT", builder.math("LOGARITHM", inputs.outer, math.e), log_inner)
+    phases = inputs.phase, builder.math("FRACT", builder.math("ADD", inputs.phase, 0.5))
+    shares = [
+        builder.math("POWER", builder.math("SINE", builder.math("MULTIPLY", phase, math.pi)), 2.0) for phase in phases
+    ]
+    squares = builder.math("MULTIPLY_ADD", shares[0], shares[0], builder.math("MULTIPLY", shares[1], shares[1]))
+    contrast = builder.math("SQRT", squares)
+    return _Shared(
+        log_inner=log_inner,
+        log_width=log_width,
+        patterns=tuple(
+            (builder.math("MULTIPLY", phase, inputs.period), builder.math("DIVIDE", share, contrast), turn)
+            for phase, share, turn in zip(phases, shares, (inputs.first_turn, inputs.second_turn), strict=True)
+        ),
+        brightness_power=builder.math("MULTIPLY", inputs.beaming, inputs.doppler_brightness),
+        temperature_power=builder.math("MULTIPLY", inputs.colour_variation, 0.25),
+        brightness=builder.math("POWER", 2.0, inputs.exposure),
+        profile_rows=_rows(builder, inputs.profile),
+        colour_rows=_rows(builder, inputs.colours),
+    )
+
+
+def _rows(builder: TreeBuilder, table: Socket) -> Socket:
+    _, height = builder.image_size(table)
+    return builder.math("MAXIMUM", 2.0, height)
+
+
+def _look_up(builder: TreeBuilder, table: Socket, rows: Socket, place: Socket) -> Socket:
+    """A table's value between its first row, at place 0, which is at the top, and its last, at place 1."""
+    steps = builder.math("SUBTRACT", rows, 1.0)
+    below = builder.math("MULTIPLY_ADD", builder.math("SUBTRACT", 1.0, place), steps, 0.5)
+    return sample_bilinearly(builder, table, 0.5, builder.math("DIVIDE", below, rows))
+
+
+def _clamped(builder: TreeBuilder, value: Socket, low: Value, high: Value) -> Socket:
+    return builder.math("MINIMUM", high, builder.math("MAXIMUM", low, value))
+
+
+def _depth(builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, radius: Socket) -> Socket:
+    """ln(r / inner) / ln(outer / inner), from 0 at the inner rim to 1 at the outer one."""
+    inside = _clamped(builder, radius, inputs.inner, inputs.outer)
+    log = builder.math("SUBTRACT", builder.math("LOGARITHM", inside, math.e), shared.log_inner)
+    return _clamped(builder, builder.math("DIVIDE", log, shared.log_width), 0.0, 1.0)
+
+
+def _moving_texture(
+    builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, place: tuple[Socket, Socket, Socket, Socket]
+) -> tuple[Socket, Socket]:
+    """Streaks and clumps, 0 to 1, of two patterns that turn with the matter; see `physics.disk_texture`."""
+    radius, phi, depth, coverage = place
+    # Omega = +-1 / (r^(3/2) +- a), BPT Eq. 2.16
+    outside = builder.math("MAXIMUM", radius, inputs.inner)
+    period = builder.math(
+        "MULTIPLY_ADD",
+        outside,
+        builder.math("SQRT", outside),
+        builder.math("MULTIPLY", inputs.direction, inputs.spin),
+    )
+    omega = builder.math("DIVIDE", inputs.direction, period)
+    v = builder.math("SUBTRACT", 1.0, depth)
+    total: Socket | None = None
+    for age, share, turn in shared.patterns:
+        azimuth = builder.math("SUBTRACT", builder.math("ADD", phi, turn), builder.math("MULTIPLY", omega, age))
+        u = builder.math("FRACT", builder.math("MULTIPLY", azimuth, 0.5 / math.pi))
+        pattern = sample_bilinearly(builder, inputs.texture, u, v)
+        pattern = builder.vector_scale(builder.vector_math("SUBTRACT", pattern, (0.5, 0.5, 0.5)), share)
+        total = pattern if total is None else builder.vector_math("ADD", total, pattern)
+    # A rim, or all of the disk at once in a thin ring, shows the mean.
+    found = []
+    for value in builder.separate(total)[:2]:
+        whole = _clamped(builder, value, -0.5, 0.5)
+        found.append(builder.math("MULTIPLY_ADD", whole, coverage, 0.5))
+    return found[0], found[1]
+
+
+def _density(builder: TreeBuilder, inputs: DiskInputs, depth: Socket, streaks: Socket, clumps: Socket) -> Socket:
+    thick: Socket | None = None
+    for way, softness in ((depth, inputs.inner_softness), (None, inputs.outer_softness)):
+        way = builder.math("SUBTRACT", 1.0, depth) if way is None else way
+        t = builder.math("DIVIDE", way, builder.math("MAXIMUM", _SMALLEST_SOFTNESS, softness))
+        t = _clamped(builder, t, 0.0, 1.0)
+        step = builder.math("MULTIPLY", builder.math("MULTIPLY", t, t), builder.math("MULTIPLY_ADD", t, -2.0, 3.0))
+        thick = step if thick is None else builder.math("MULTIPLY", thick, step)
+    for value, amount in ((streaks, inputs.streaks), (clumps, inputs.clumps)):
+        missing = builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, value), amount)
+        thick = builder.math("MULTIPLY", thick, builder.math("SUBTRACT", 1.0, missing))
+    return thick
+
+
+def _emission(builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, depth: Socket, g: Socket) -> Socket:
+    """Light of an opaque disk where it is densest; see `physics.disk_look.emission`."""
+    flux, _, _ = builder.separate(_look_up(builder, inputs.profile, shared.profile_rows, depth))
+    flux = builder.math("MAXIMUM", 0.0, flux)
+    shift = builder.math("MAXIMUM", _SMALLEST_G, g)
+    cooling = builder.math("POWER", builder.math("MAXIMUM", _SMALLEST_FLUX, flux), shared.temperature_power)
+    seen = builder.math("POWER", shift, inputs.doppler_colour)
+    temperature = builder.math("MULTIPLY", builder.math("MULTIPLY", inputs.temperature, cooling), seen)
+    temperature = _clamped(builder, temperature, disk_look.COLDEST, disk_look.HOTTEST)
+    log = builder.math("SUBTRACT", builder.math("LOGARITHM", temperature, math.e), _LOWEST)
+    place = builder.math("MULTIPLY", log, 1.0 / (_HIGHEST - _LOWEST))
+    colour = _look_up(builder, inputs.colours, shared.colour_rows, place)
+    brightness = builder.math("POWER", flux, inputs.falloff)
+    beamed = builder.math("POWER", shift, shared.brightness_power)
+    factor = builder.math("MULTIPLY", builder.math("MULTIPLY", brightness, beamed), shared.brightness)
+    return builder.vector_scale(colour, factor)
+
+
+def _all_there(builder: TreeBuilder, inputs: DiskInputs) -> Socket:
+    """1 if each pass that the map has is a picture, else 0; a file that is missing has no size."""
+    there: Socket | None = None
+    for number, one in enumerate(inputs.passes, start=1):
+        width, _ = builder.image_size(one)
+        unwanted = builder.math("LESS_THAN", inputs.images, number - 0.5)
+        one_there = builder.math("MAXIMUM", unwanted, builder.math("GREATER_THAN", width, 0.5))
+        there = one_there if there is None else builder.math("MULTIPLY", there, one_there)
+    return there

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The accretion disk in the sidebar, and the operator that sets one of its looks."""
+
+import bpy
+
+from . import disk_properties, shot
+from ._physics import disk_look
+
+# Identifiers as scripts write them -> names of `PRESETS`.
+PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in disk_look.PRESETS}
+_PRESET_TEXTS = {
+    "gargantua": ("Gargantua", "Thin, warm and even: the same brightness on both sides, as in the film"),
+    "physical": ("Physical", "All as physics has it, with the side that comes towards the camera far brighter"),
+    "blue hot": ("Blue Hot", "Young and hot, with a part of the Doppler effect"),
+    "ember": ("Ember", "Cool, clumpy and red"),
+}
+
+
+class UMBRA_OT_disk_preset(bpy.types.Operator):
+    bl_idname = "umbra.disk_preset"
+    bl_label = "Look"
+    bl_description = "Set the look of the black hole's disk; its edges and its texture stay, and nothing is baked anew"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: bpy.props.EnumProperty(
+        name="Look",
+        items=tuple((identifier, *_PRESET_TEXTS[name]) for identifier, name in PRESET_NAMES.items()),
+        default=disk_properties.DEFAULT_LOOK.upper(),
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return shot.find_active_hole(context.scene) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hole = shot.find_active_hole(context.scene)
+        disk_properties.use_look(hole.umbra.disk, disk_look.PRESETS[PRESET_NAMES[self.preset]])
+        return {"FINISHED"}
+
+
+class VIEW3D_PT_umbra_disk(bpy.types.Panel):
+    bl_label = "Disk"
+    bl_parent_id = "VIEW3D_PT_umbra"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Umbra"
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return shot.find_active_hole(context.scene) is not None
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(shot.find_active_hole(context.scene).umbra.disk, "enabled", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        hole = shot.find_active_hole(context.scene)
+        settings = hole.umbra.disk
+        layout.active = settings.enabled
+        layout.operator_menu_enum("umbra.disk_preset", "preset", icon="PRESET")
+        column = layout.column(align=True)
+        column.prop(settings, "inner_at_isco")
+        if settings.inner_at_isco:
+            column.label(text=f"Begins at {disk_properties.innermost_orbit(hole):.3g} M")
+        else:
+            column.prop(settings, "inner_radius")
+        column.prop(settings, "outer_radius")
+        layout.prop(settings, "retrograde")
+        layout.prop(settings, "crossings")
+        column = layout.column(align=True)
+        column.prop(settings, "temperature")
+        column.prop(settings, "exposure")
+        column.prop(settings, "opacity")
+        column = layout.column(align=True)
+        column.prop(settings, "doppler_colour")
+        column.prop(settings, "doppler_brightness")
+        column.prop(settings, "beaming")
+        layout.prop(settings, "light")
+        if settings.light:
+            layout.prop(settings, "light_strength")
+
+
+class VIEW3D_PT_umbra_disk_detail(bpy.types.Panel):
+    bl_label = "Profile and Streaks"
+    bl_parent_id = "VIEW3D_PT_umbra_disk"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Umbra"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        settings = shot.find_active_hole(context.scene).umbra.disk
+        layout.active = settings.enabled
+        layout.prop(settings, "profile")
+        if settings.profile == "power_law":
+            layout.prop(settings, "exponent")
+        for name in ("falloff", "colour_variation", "inner_softness", "outer_softness"):
+            layout.prop(settings, name)
+        layout.separator()
+        layout.template_ID(settings, "texture", open="image.open", text="Texture")
+        for name in ("streaks", "clumps", "gain", "turning_speed"):
+            layout.prop(settings, name)
+
+
+CLASSES = (UMBRA_OT_disk_preset, VIEW3D_PT_umbra_disk, VIEW3D_PT_umbra_disk_detail)

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The disk in rendered pictures: each pixel is what numpy's reference says, at any frame, size and look.
+
+The group works in float32, and takes the flux from a table; LIGHT is the share of the disk's light by which it may
+differ. Streaks are the steepest part: a texture coordinate is off by 1e-6 of a turn, which is 1/500 texel, of which
+neighbours differ by up to a tenth.
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from small_scene import add_hole, environment_pixels, render, run_python, shrink
+
+LIGHT = 2e-3
+TYPICAL = 2e-5
+
+
+@pytest.fixture
+def modules(addon_module: Callable[[str], ModuleType]) -> ModuleType:
+    return addon_module("_physics")
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    """A small scene with maps of its own."""
+    scene = bpy.context.scene
+    shrink(scene, (96, 54))
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    return scene
+
+
+def hole_with_disk(scene: bpy.types.Scene, **settings: object) -> bpy.types.Object:
+    hole = add_hole(scene)
+    hole.umbra.disk.enabled = True
+    for name, value in settings.items():
+        setattr(hole.umbra.disk, name, value)
+    return hole
+
+
+def expected_picture(
+    scene: bpy.types.Scene,
+    addon_module: Callable[[str], ModuleType],
+    tmp_path: Path,
+    size: tuple[int, int],
+    texture: np.ndarray | None = None,
+    frame: int | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The picture by numpy in float64, and the light of the disk in it."""
+    modules, maps, shot = addon_module("_physics"), addon_module("maps"), addon_module("shot")
+    settings = scene.umbra.active_hole.umbra.disk
+    frame = scene.frame_current if frame is None else frame
+    parameters = shot.read_at(scene, frame).parameters
+    path = maps.map_path(scene, scene.umbra.active_hole.name, parameters.map_size, frame)
+    physics = modules.physics
+    passes = [physics.read_disk_pass(each) for each in maps.pass_paths(path, parameters)]
+    look = addon_module("disk_properties").look_of(settings)
+    texture = addon_module("disk_images").streaks() if texture is None else texture
+    time = frame * settings.turning_speed * scene.render.fps_base / scene.render.fps
+    light, through = modules.disk_render.disk_layers(passes, look, texture, time)
+    sky = modules.reference_render.render(physics.read_warp_map(path), environment_pixels(), output_size=size).image
+    picture = modules.disk_render.over_sky(sky, light, through)
+    return picture, modules.reference_render.resize(light, size)
+
+
+def assert_same(picture: np.ndarray, expected: np.ndarray, light: np.ndarray) -> None:
+    wrong = np.abs(picture[..., :3] - expected[..., :3])
+    brightest = light.max()
+    assert brightest > 0.1
+    assert (light.max(axis=-1) > 0.01 * brightest).mean() > 0.02, "there should be a disk in the picture"
+    assert wrong.max() < LIGHT * max(brightest, 1.0)
+    assert np.median(wrong) < TYPICAL * max(brightest, 1.0)
+
+
+@pytest.mark.parametrize("percentage", [100, 50])
+def test_default_disk_is_what_numpy_makes(
+    scene: bpy.types.Scene,
+    tmp_path: Path,
+    addon_module: Callable[[str], ModuleType],
+    modules: ModuleType,
+    percentage: int,
+) -> None:
+    hole_with_disk(scene)
+    scene.render.resolution_percentage = percentage
+    scene.frame_set(7)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    size = (96 * percentage // 100, 54 * percentage // 100)
+    expected, light = expected_picture(scene, addon_module, tmp_path, size)
+    assert picture.shape[:2] == size[::-1]
+    assert_same(picture, expected, light)
+
+
+@pytest.mark.parametrize("preset", ["GARGANTUA", "PHYSICAL", "BLUE_HOT", "EMBER"])
+def test_every_preset_is_what_numpy_makes(
+    scene: bpy.types.Scene,
+    tmp_path: Path,
+    addon_module: Callable[[str], ModuleType],
+    modules: ModuleType,
+    preset: str,
+) -> None:
+    hole = hole_with_disk(scene, retrograde=preset == "EMBER")
+    assert bpy.ops.umbra.disk_preset(preset=preset) == {"FINISHED"}
+    name = preset.lower().replace("_", " ")
+    for field, value in vars(modules.disk_look.PRESETS[name]).items():
+        found = getattr(addon_module("disk_properties").look_of(hole.umbra.disk), field)
+        assert found == (value if isinstance(value, str) else pytest.approx(value, rel=1e-6)), field
+    scene.frame_set(40)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    assert_same(picture, expected, light)
+
+
+def test_one_colour_inside_the_innermost_orbit_with_two_images(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    hole_with_disk(
+        scene,
+        profile="power_law",
+        exponent=2.5,
+        inner_at_isco=False,
+        inner_radius=1.8,
+        outer_radius=9.0,
+        beaming="MONOCHROMATIC",
+        doppler_colour=0.3,
+        doppler_brightness=0.6,
+        crossings=2,
+    )
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == 2
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    assert_same(picture, expected, light)
+
+
+def test_supersampled_passes_are_box_filtered(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    hole_with_disk(scene)
+    scene.umbra.supersampling = "2"
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    assert_same(picture, expected, light)
+
+
+@pytest.mark.parametrize("frame", [1, 10_000, -400])
+def test_turning_keeps_its_contrast_over_a_long_shot(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType, frame: int
+) -> None:
+    """Equal to numpy at any frame, where contrast is known to be kept; and sheared no more than at the beginning."""
+    hole_with_disk(scene)
+    scene.frame_start, scene.frame_end = -1000, 20_000
+    scene.frame_set(frame)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    assert_same(picture, expected, light)
+    bright = light.max(axis=-1) > 0.05 * light.max()
+    steps = np.abs(np.diff(np.log(light.max(axis=-1) + 1e-9), axis=1))[bright[:, 1:] & bright[:, :-1]]
+    assert 0.05 < steps.mean() < 1.0
+
+
+def test_pictures_of_any_image_without_a_seam(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    """A smooth picture that repeats across: brightness may not jump where the azimuth goes from 2 pi to 0."""
+    height, width = 16, 64
+    row, column = np.mgrid[0:height, 0:width]
+    wave = 0.5 + 0.4 * np.cos(2.0 * math.pi * (column + 0.5) / width) * np.cos(0.3 * row)
+    values = np.stack([wave, wave[:, ::-1] ** 2], axis=-1).astype(np.float32)
+    full = np.ones((height, width, 4), np.float32)
+    full[..., :2] = values
+    image = bpy.data.images.new("Stripes", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(full[::-1].ravel())
+    image.pack()
+    hole = hole_with_disk(scene, texture=image, turning_speed=0.0)
+    hole.rotation_euler = (0.2, 0.0, 2.0)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), values.astype(np.float64))
+    assert_same(picture, expected, light)
+
+    (path,) = (tmp_path / "maps").glob("*_disk1_0001.exr")
+    one = modules.physics.read_disk_pass(path)
+    across = np.abs(np.diff(one.phi, axis=1)) > math.pi
+    across &= np.minimum(one.coverage[:, 1:], one.coverage[:, :-1]) > 0.99
+    assert across.sum() > 5, "the seam should be in the picture"
+    jump = np.abs(np.diff(picture[..., 0], axis=1))
+    inside = np.minimum(one.coverage[:, 1:], one.coverage[:, :-1]) > 0.99
+    assert jump[across].mean() < 3.0 * jump[inside].mean()
+
+
+def test_animated_look_is_that_of_each_frame(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    hole = hole_with_disk(scene, profile="novikov_thorne")
+    for frame, temperature, streaks in ((1, 3000.0, 0.2), (3, 9000.0, 0.9)):
+        hole.umbra.disk.temperature, hole.umbra.disk.streaks = temperature, streaks
+        hole.keyframe_insert("umbra.disk.temperature", frame=frame)
+        hole.keyframe_insert("umbra.disk.streaks", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.render.filepath = str(tmp_path / "frame_####.exr")
+    bpy.ops.render.render(animation=True)
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+        picture, _ = modules.exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")
+        assert_same(picture, expected, light)
+
+
+def test_animated_spin_is_refused_within_one_render_and_drawn_frame_by_frame(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    hole = hole_with_disk(scene)
+    for frame, spin in ((1, 0.2), (3, 0.9)):
+        hole.umbra.spin = spin
+        hole.keyframe_insert("umbra.spin", frame=frame)
+    for frame in (1, 2):
+        scene.frame_set(frame)
+        picture = render(scene, tmp_path / "picture.exr", modules.exr)
+        expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+        assert_same(picture, expected, light)
+    parameters = addon_module("shot").read_at(scene, 3).parameters
+    with pytest.raises(addon_module("errors").SceneError, match="is animated, which its disk cannot follow"):
+        addon_module("disk_sync").check_shot(scene, parameters)
+
+
+def test_objects_stand_in_front_of_the_disk(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    hole_with_disk(scene)
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=scene.camera.location * 0.5)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    tree = addon_module("compositor_tree").find_setup(scene)
+    (link,) = tree.group.inputs["Render"].links
+    layer = link.from_socket
+    for each in list(tree.group.outputs["Image"].links):
+        tree.tree.links.new(layer, each.to_socket)
+    foreground = render(scene, tmp_path / "foreground.exr", modules.exr)
+    covered = foreground[..., 3] == 1.0
+    assert (covered & (light.max(axis=-1) > 0.1)).sum() > 20, "the cube should hide a part of the disk"
+    np.testing.assert_allclose(picture[covered][:, :3], foreground[covered][:, :3], atol=1e-6)
+    clear = foreground[..., 3] == 0.0
+    assert np.abs(picture - expected)[clear][:, :3].max() < LIGHT * max(light.max(), 1.0)
+
+
+def test_saved_file_renders_the_same_without_the_add_on(
+    scene: bpy.types.Scene, tmp_path: Path, modules: ModuleType
+) -> None:
+    hole_with_disk(scene)
+    scene.frame_start, scene.frame_end = 5, 6
+    blend = tmp_path / "saved.blend"
+    scene.umbra.map_folder = "//maps/"
+    scene.render.filepath = str(tmp_path / "here_####.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.render.render(animation=True)
+    there = tmp_path / "there_####.exr"
+    code = (
+        f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n"
+        f"bpy.context.scene.render.filepath = {str(there)!r}\n"
+        "bpy.ops.render.render(animation=True)\n"
+    )
+    done = run_python(code, resources=tmp_path / "plain")
+    assert done.returncode == 0, done.stdout + done.stderr
+    for frame in (5, 6):
+        here, _ = modules.exr.read_exr(tmp_path / f"here_{frame:04d}.exr")
+        plain, _ = modules.exr.read_exr(tmp_path / f"there_{frame:04d}.exr")
+        np.testing.assert_allclose(plain, here, atol=1e-6)
+
+
+def test_headless_render_bakes_and_draws_the_disk(scene: bpy.types.Scene, tmp_path: Path, modules: ModuleType) -> None:
+    hole_with_disk(scene)
+    blend = tmp_path / "saved.blend"
+    scene.umbra.map_folder = "//maps/"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    picture = tmp_path / "picture.exr"
+    done = run_python(
+        f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n"
+        f"bpy.context.scene.render.filepath = {str(picture)!r}\n"
+        "bpy.ops.render.render(write_still=True)\n"
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(list((tmp_path / "maps").glob("*.exr"))) == 4
+    pixels, _ = modules.exr.read_exr(picture)
+    assert pixels[..., :3].max() > 1.0, "the disk is brighter than the sky"

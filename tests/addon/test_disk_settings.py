@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The disk's settings: what they bake, what they leave alone, what they add and take away, and what they refuse."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from small_scene import add_hole, links_of, shrink
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    """A small scene with maps of its own."""
+    scene = bpy.context.scene
+    shrink(scene, (48, 27))
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    return scene
+
+
+@pytest.fixture
+def hole(scene: bpy.types.Scene) -> bpy.types.Object:
+    hole = add_hole(scene)
+    hole.umbra.disk.enabled = True
+    return hole
+
+
+def files(tmp_path: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in sorted((tmp_path / "maps").glob("*.exr"))}
+
+
+def bake() -> None:
+    assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
+
+
+def test_passes_lie_beside_the_map_and_hold(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    bake()
+    assert list(files(tmp_path)) == [
+        "Scene_Black_Hole_48x27_0001.exr",
+        "Scene_Black_Hole_48x27_disk1_0001.exr",
+        "Scene_Black_Hole_48x27_disk2_0001.exr",
+        "Scene_Black_Hole_48x27_disk3_0001.exr",
+    ]
+    physics = addon_module("_physics").physics
+    warp_map = physics.read_warp_map(tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr")
+    for number in (1, 2, 3):
+        one = physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
+        assert one.metadata["crossing"] == number
+        assert one.metadata["hash"] == warp_map.metadata["hash"]
+    maps = addon_module("maps")
+    assert maps.count_baked(scene, hole.name, (48, 27), range(1, 5)) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("inner_at_isco", False), ("outer_radius", 12.0), ("retrograde", True), ("crossings", 2), ("enabled", False)],
+)
+def test_settings_of_the_passes_make_them_stale(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, name: str, value: object
+) -> None:
+    bake()
+    before = files(tmp_path)
+    setattr(hole.umbra.disk, name, value)
+    bake()
+    after = files(tmp_path)
+    assert after["Scene_Black_Hole_48x27_0001.exr"] != before["Scene_Black_Hole_48x27_0001.exr"]
+
+
+def test_settings_of_the_look_leave_the_passes_alone(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path
+) -> None:
+    bake()
+    before = files(tmp_path)
+    for preset in ("GARGANTUA", "PHYSICAL", "BLUE_HOT", "EMBER"):
+        assert bpy.ops.umbra.disk_preset(preset=preset) == {"FINISHED"}
+    hole.umbra.disk.turning_speed, hole.umbra.disk.light, hole.umbra.disk.beaming = 3.0, True, "MONOCHROMATIC"
+    bake()
+    assert files(tmp_path) == before
+
+
+def damage(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[-40:] = bytes(40)
+    path.write_bytes(content)
+
+
+def of_another_map(path: Path) -> None:
+    path.write_bytes(path.with_name(path.name.replace("_0001", "_0002")).read_bytes())
+
+
+@pytest.mark.parametrize("spoil", [Path.unlink, damage, of_another_map])
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_spoilt_pass_makes_the_frame_stale(
+    scene: bpy.types.Scene,
+    hole: bpy.types.Object,
+    tmp_path: Path,
+    addon_module: Callable[[str], ModuleType],
+    number: int,
+    spoil: Callable[[Path], None],
+) -> None:
+    maps, shot = addon_module("maps"), addon_module("shot")
+    bake()
+    scene.camera.location.x += 1.0
+    scene.frame_set(2)
+    bake()
+    scene.camera.location.x -= 1.0
+    scene.frame_set(1)
+    path = tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr"
+    parameters = shot.read_at(scene, 1).parameters
+    assert maps.fault_of(path, parameters) is None
+    spoil(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
+    fault = maps.fault_of(path, parameters)
+    assert f"disk{number}" in fault
+    bake()
+    assert maps.fault_of(path, parameters) is None
+
+
+def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """Turning the hole about its axis is the camera's orbit; the map of another frame is turned, not traced."""
+    hole.rotation_euler.z = 0.0
+    hole.keyframe_insert("rotation_euler", frame=1)
+    hole.rotation_euler.z = 0.5
+    hole.keyframe_insert("rotation_euler", frame=2)
+    scene.frame_start, scene.frame_end = 1, 2
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    physics = addon_module("_physics").physics
+    first, second = (
+        physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk1_000{frame}.exr") for frame in (1, 2)
+    )
+    seen = first.coverage > 0.0
+    assert seen.sum() > 50
+    turned = (second.phi - first.phi)[seen]
+    np.testing.assert_allclose(np.cos(turned), np.cos(0.5), atol=1e-5)
+    np.testing.assert_array_equal(first.radius, second.radius)
+    assert second.metadata["counts"]["rays"] == 0
+
+
+def test_switching_the_disk_off_takes_all_of_it_away(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
+    hole = add_hole(scene)
+    setup = addon_module("compositor_tree").find_setup(scene)
+    links, nodes = links_of(setup.tree), len(setup.tree.nodes)
+    images, groups, objects = (set(each.keys()) for each in (bpy.data.images, bpy.data.node_groups, bpy.data.objects))
+    hole.umbra.disk.enabled = True
+    hole.umbra.disk.light = True
+    assert len(setup.tree.nodes) > nodes
+    assert setup.group.inputs["Disk"].is_linked
+    hole.umbra.disk.enabled = False
+    assert links_of(setup.tree) == links
+    assert len(setup.tree.nodes) == nodes
+    assert set(bpy.data.images.keys()) == images
+    assert set(bpy.data.node_groups.keys()) == groups
+    assert set(bpy.data.objects.keys()) == objects
+
+
+def test_removing_the_set_up_removes_the_disk_and_a_new_one_brings_it_back(
+    scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
+) -> None:
+    assert bpy.ops.umbra.remove_compositor() == {"FINISHED"}
+    assert not any(each.name.startswith("Umbra") for each in bpy.data.node_groups)
+    assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
+    assert addon_module("compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
+
+
+def test_a_damaged_group_is_rebuilt_when_the_file_is_opened(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    group = addon_module("disk_group").GROUP
+    tree = group.find()
+    tree["umbra_disk_version"] = 0
+    for node in list(tree.nodes)[::3]:
+        tree.nodes.remove(node)
+    hole.umbra.disk["temperature"] = 5123.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    tree = addon_module("disk_group").GROUP.find()
+    assert group.is_current(tree)
+    assert all(link.is_valid for link in tree.links)
+
+
+def test_a_missing_pass_is_magenta(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """Where nothing checks: in a Blender whose handlers do not run."""
+    bake()
+    (tmp_path / "maps" / "Scene_Black_Hole_48x27_disk2_0001.exr").unlink()
+    handlers = addon_module("handlers")
+    handlers.unregister()
+    try:
+        scene.render.filepath = str(tmp_path / "picture.exr")
+        bpy.ops.render.render(write_still=True)
+    finally:
+        handlers.register()
+    pixels, _ = addon_module("_physics").exr.read_exr(tmp_path / "picture.exr")
+    np.testing.assert_allclose(pixels[..., :3], np.broadcast_to((1.0, 0.0, 1.0), pixels[..., :3].shape), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "method", "message"),
+    [
+        ({"outer_radius": 1.5}, None, "outer radius is 1.5 M; it must be larger than the inner one"),
+        ({"inner_at_isco": False, "inner_radius": 1.0}, None, "inner radius is 1 M; the horizon"),
+        ({}, "cash-karp-printed", "disk"),
+    ],
+)
+def test_impossible_disks_are_refused_with_a_sentence(
+    scene: bpy.types.Scene, hole: bpy.types.Object, settings: dict[str, object], method: str | None, message: str
+) -> None:
+    for name, value in settings.items():
+        setattr(hole.umbra.disk, name, value)
+    if method is not None:
+        scene.umbra.method = method
+    with pytest.raises(RuntimeError, match=message):
+        bpy.ops.umbra.bake_frame()
+
+
+def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """A white plate close to the plane of a bright even disk is lit by the disk's own radiance."""
+    settings = hole.umbra.disk
+    values = {
+        "streaks": 0.0, "clumps": 0.0, "falloff": 0.0, "colour_variation": 0.0, "opacity": 1.0, "exposure": 0.0,
+        "inner_softness": 0.0, "outer_softness": 0.0, "gain": 1.0, "temperature": 6500.0, "light": True,
+    }  # fmt: skip
+    for name, value in values.items():
+        setattr(settings, name, value)
+    light = addon_module("disk_light").find(hole)
+    assert light is not None
+    assert not light.visible_camera
+    scale = hole.umbra.mass_scale
+    bpy.ops.mesh.primitive_plane_add(size=0.2 * scale, location=(0.0, 12.0 * scale, 0.1 * scale))
+    plate = bpy.data.materials.new("White")
+    if bpy.app.version < (5, 0):
+        plate.use_nodes = True
+    plate.node_tree.nodes.clear()
+    diffuse = plate.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    output = plate.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    plate.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    bpy.context.object.data.materials.append(plate)
+    for each in list(bpy.data.objects):
+        if each.type == "LIGHT":
+            bpy.data.objects.remove(each)
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    # from below, through the light: it is not in the way, and the plate's lower face is what it lights
+    scene.camera.location = (0.0, 12.0 * scale, -1.0 * scale)
+    scene.camera.rotation_euler = (3.14159265, 0.0, 0.0)
+    scene.camera.data.clip_start = 1e-3
+    scene.cycles.samples = 256
+    scene.render.use_compositing = False
+    scene.render.filepath = str(tmp_path / "lit.exr")
+    bpy.ops.render.render(write_still=True)
+    modules = addon_module("_physics")
+    pixels, _ = modules.exr.read_exr(tmp_path / "lit.exr")
+    lit = pixels[12:15, 22:26].reshape(-1, 4)
+    assert (lit[:, 3] == 1.0).all()
+    assert pixels[0, 0, 3] == 0.0, "beside the plate there is nothing, not the glowing disk"
+    expected = modules.disk_look.seen_colour(np.array([6500.0]))[0]
+    # The disk fills all but the horizon of what the plate sees; 256 samples a pixel, twelve pixels.
+    np.testing.assert_allclose(lit[:, :3].mean(axis=0), expected, rtol=0.05)
+
+
+def test_light_goes_with_its_hole(
+    scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
+) -> None:
+    hole.umbra.disk.light = True
+    assert addon_module("disk_light").find(hole) is not None
+    bpy.data.objects.remove(hole)
+    addon_module("disk_sync").refresh(scene)
+    assert not any("umbra_disk_light" in each for each in bpy.data.objects)
+    assert not addon_module("compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
+
+
+def test_holes_of_two_scenes_keep_tables_of_their_own(
+    scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
+) -> None:
+    other = bpy.data.scenes.new("Other")
+    second = bpy.data.objects.new("Second Hole", None)
+    other.collection.objects.link(second)
+    second.umbra.is_black_hole = True
+    second.umbra.spin = 0.1
+    other.umbra.active_hole = second
+    addon_module("compositing").set_up(other)
+    second.umbra.disk.enabled = True
+    find_setup, find_node = addon_module("compositor_tree").find_setup, addon_module("compositor_tree").find_node
+    tables = [find_node(find_setup(each).tree, "disk_profile").image for each in (scene, other)]
+    assert tables[0] != tables[1]
+    values = [list(each.pixels[:])[0::4] for each in tables]
+    assert values[0] != values[1]
