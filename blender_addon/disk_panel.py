@@ -73,10 +73,11 @@ class VIEW3D_PT_umbra_disk(bpy.types.Panel):
         column.prop(settings, "temperature")
         column.prop(settings, "exposure")
         column.prop(settings, "opacity")
+        layout.prop(settings, "beaming")
         column = layout.column(align=True)
+        column.use_property_split = False  # the names are too long to stand beside their fields
         column.prop(settings, "doppler_colour")
         column.prop(settings, "doppler_brightness")
-        column.prop(settings, "beaming")
         layout.prop(settings, "light")
         if settings.light:
             layout.prop(settings, "light_strength")

@@ -295,3 +295,50 @@ def test_holes_of_two_scenes_keep_tables_of_their_own(
     assert tables[0] != tables[1]
     values = [list(each.pixels[:])[0::4] for each in tables]
     assert values[0] != values[1]
+
+
+class Layout:
+    """Stands in for a panel's layout, and refuses what Blender would refuse."""
+
+    def __init__(self, drawn: list[str]) -> None:
+        self.drawn = drawn
+
+    def column(self, **_options: object) -> "Layout":
+        return Layout(self.drawn)
+
+    def label(self, text: str) -> None:
+        self.drawn.append(text)
+
+    def separator(self) -> None:
+        self.drawn.append("")
+
+    def prop(self, owner: object, name: str, **_options: object) -> None:
+        assert name in owner.bl_rna.properties
+        self.drawn.append(name)
+
+    template_ID = prop
+
+    def operator_menu_enum(self, operator: str, name: str, **_options: object) -> None:
+        kind = bpy.ops.umbra.disk_preset
+        assert operator == "umbra.disk_preset"
+        assert name in kind.get_rna_type().properties
+        self.drawn.append(operator)
+
+
+def test_panel_shows_every_setting(hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]) -> None:
+    panels = addon_module("disk_panel")
+    drawn: list[str] = []
+    settings = hole.umbra.disk
+
+    class Panel:
+        layout = Layout(drawn)
+
+    for at_isco, profile in ((True, "novikov_thorne"), (False, "power_law")):
+        settings.inner_at_isco, settings.profile, settings.light = at_isco, profile, not at_isco
+        for panel in (panels.VIEW3D_PT_umbra_disk, panels.VIEW3D_PT_umbra_disk_detail):
+            if hasattr(panel, "draw_header"):
+                panel.draw_header(Panel, bpy.context)
+            panel.draw(Panel, bpy.context)
+    names = {each.identifier for each in settings.bl_rna.properties} - {"rna_type", "name"}
+    assert names <= set(drawn)
+    assert "Begins at 2.32 M" in drawn
