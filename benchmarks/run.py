@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures tracing, maps, files and animations, and writes a table and two plots.
+"""Measures tracing, maps, files, animations and the Cycles Lens, and writes a table and two plots.
 
-The scene of every number: spin 0.999, r = 10 on the circular orbit, 60 degrees high, looking at the hole.
+The scene of every number but the lens's: spin 0.999, r = 10 on the circular orbit, 60 degrees high, looking at the
+hole.
 """
 
 # isort: off
@@ -13,9 +14,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import animations
+import lens
 import maps
 import plots
 import tracing
+
+# Pictures take seconds, so that a disturbance is a small part of them.
+LENS_REPEATS = 3
 
 
 def main() -> None:
@@ -34,6 +39,7 @@ def main() -> None:
     table.add(tracing.rows(options.repeats, options.kgeo))
     table.add(maps.rows(options.repeats))
     table.add(animations.rows(options.frames, options.orbit_frames))
+    table.add(lens.rows(min(options.repeats, LENS_REPEATS)))
     table.add(["", *maps.file_lines(options.repeats)])
     table.add(["", f"peak resident memory of the whole run: {measuring.process_memory():.0f} MB"])
     if not options.no_plots:

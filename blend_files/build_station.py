@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 import random
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import scene_tools as tools
-from scene_tools import Euler, Matrix, MeshParts, Vector, bpy
+import skies
+from scene_tools import Matrix, MeshParts, Vector, bpy
 
 FRAMES = 72
 SKY_HEIGHT = 2048
@@ -22,50 +21,6 @@ STAR_WIDTH = 0.8
 
 WHEEL = 1.9  # radius of the middle of the rim
 HALF_WIDTH, HALF_DEPTH = 0.17, 0.24  # of the rim: along the radius, along the axis
-
-
-# --- sky ------------------------------------------------------------------------------------------
-
-
-def star_panorama() -> bpy.types.Image:
-    """The sky of real stars, half floats, packed. DWAA keeps it at a third of what a lossless file takes."""
-    from physics import star_sky
-
-    pixels = np.ones((SKY_HEIGHT, 2 * SKY_HEIGHT, 4), np.float32)
-    pixels[..., :3] = star_sky.star_sky(SKY_HEIGHT, star_width=STAR_WIDTH)
-    buffer = bpy.data.images.new("Pixels", 2 * SKY_HEIGHT, SKY_HEIGHT, float_buffer=True)
-    buffer.colorspace_settings.name = "Linear Rec.709"
-    buffer.pixels.foreach_set(pixels[::-1].ravel())
-    settings = bpy.context.scene.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "16"
-    settings.exr_codec, settings.quality = "DWAA", 95
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "star_sky.exr")
-        buffer.save_render(str(path))
-        print(f"star sky: {path.stat().st_size / 1e6:.1f} MB")
-        image = tools.pack_image(path, "Star Sky")
-    bpy.data.images.remove(buffer)
-    settings.exr_codec, settings.quality = "ZIP", 90
-    settings.file_format, settings.color_depth = "PNG", "8"
-    return image
-
-
-def sky_rotation(longitude: float, latitude: float, roll: float) -> Euler:
-    """The environment rotation that puts a galactic direction behind the hole (world +y).
-
-    Parameters
-    ----------
-    longitude, latitude, roll : float
-        Galactic coordinates, and the angle by which the Milky Way's band is turned in the picture; degrees.
-    """
-    from physics.milky_way import galactic_axes
-
-    lon, lat = math.radians(longitude), math.radians(latitude)
-    forward = Vector((math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)))
-    right = forward.cross(Vector((0.0, 0.0, 1.0))).normalized()
-    basis = Matrix((right, forward, right.cross(forward))).transposed()  # world axes to galactic ones
-    to_equatorial = Matrix(galactic_axes().tolist()).transposed()
-    return (to_equatorial @ basis @ Matrix.Rotation(math.radians(roll), 3, "Y")).to_euler("XYZ")
 
 
 # --- materials ------------------------------------------------------------------------------------
@@ -277,14 +232,14 @@ def build() -> None:
     """Build and save the scene."""
     scene = tools.new_scene("Station", FRAMES)
     scene.view_settings.look = "AgX - High Contrast"
-    scene.umbra.environment_image = star_panorama()
+    scene.umbra.environment_image = skies.star_panorama(SKY_HEIGHT, STAR_WIDTH, quality=95)
     scene.umbra.environment_source = "IMAGE"
     tools.world_background(scene, (0.10, 0.14, 0.22), 0.12)
 
     tilt = (math.radians(10.0), math.radians(-16.0), 0.0)
     tools.black_hole((0.0, 0.0, 0.0), tilt, spin=0.95, mass_scale=1.0, motion="CIRCULAR")
     look = tools.group_node(scene).inputs
-    look["Environment Rotation"].default_value = sky_rotation(14.0, 14.0, 28.0)
+    look["Environment Rotation"].default_value = skies.sky_rotation(14.0, 14.0, 28.0)
     look["Exposure"].default_value = 2.2
     look["Sky Temperature"].default_value = 4500.0
     look["Redshift Colour"].default_value = 1.0

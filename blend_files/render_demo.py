@@ -5,7 +5,7 @@
     PYTHONPATH=. python blend_files/render_demo.py OUT --scenes station --frames 1,36 --size 1920x1080
     PYTHONPATH=. python blend_files/render_demo.py OUT --animation
 
-Opens each scene with the bpy module that is installed here, bakes its warp maps into OUT and renders. The
+Opens each scene with the bpy module that is installed here, bakes its maps into OUT and renders. The
 scenes themselves are not changed.
 """
 
@@ -20,10 +20,17 @@ from pathlib import Path
 from scene_tools import addon, bpy
 
 FOLDER = Path(__file__).resolve().parent
-SCENES = ("station", "plinth", "disk")
-DEFAULT_FRAMES = (1, 36, 72)
+# The frames and the samples a pixel that are rendered unless others are asked for: few where Cycles renders the whole
+# picture, sky and all.
+DEFAULTS = {
+    "station": ((1, 36, 72), 48),
+    "plinth": ((1, 36, 72), 48),
+    "disk": ((1, 36, 72), 48),
+    "planets": ((40,), 16),
+    "flyby": ((44,), 16),
+}
+SCENES = tuple(DEFAULTS)
 DEFAULT_SIZE = (960, 540)
-DEFAULT_SAMPLES = 48
 
 
 def numbers(text: str) -> tuple[int, ...]:
@@ -51,10 +58,10 @@ def parse() -> argparse.Namespace:
     parser.add_argument("out", type=Path, metavar="OUT", help="the folder for the pictures, and for their warp maps")
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=SCENES, help="which scenes (default: all)")
     frames = parser.add_mutually_exclusive_group()
-    frames.add_argument("--frames", type=numbers, default=DEFAULT_FRAMES, help="default: 1,36,72")
+    frames.add_argument("--frames", type=numbers, help="default: one to three of each scene")
     frames.add_argument("--animation", action="store_true", help="all frames of each scene")
     parser.add_argument("--size", type=size, default=DEFAULT_SIZE, help="default: 960x540")
-    parser.add_argument("--samples", type=int, default=DEFAULT_SAMPLES, help="Cycles' samples a pixel (default: 48)")
+    parser.add_argument("--samples", type=int, help="Cycles' samples a pixel (default: 48, with the Cycles Lens 16)")
     return parser.parse_args()
 
 
@@ -70,10 +77,11 @@ def render_scene(name: str, arguments: argparse.Namespace) -> None:
     render.resolution_x, render.resolution_y = arguments.size
     render.resolution_percentage = 100
     render.image_settings.file_format = "PNG"
-    scene.cycles.samples = arguments.samples
+    usual_frames, usual_samples = DEFAULTS[name]
+    scene.cycles.samples = usual_samples if arguments.samples is None else arguments.samples
     scene.cycles.device = "CPU"
     choose_denoiser(scene)
-    frames = range(scene.frame_start, scene.frame_end + 1) if arguments.animation else arguments.frames
+    frames = range(scene.frame_start, scene.frame_end + 1) if arguments.animation else arguments.frames or usual_frames
     for frame in frames:
         picture = arguments.out / f"{name}_{frame:04d}.png"
         picture.unlink(missing_ok=True)  # an old picture must not pass for this one

@@ -105,6 +105,16 @@ def black_hole(location: Point, tilt: Point, spin: float, mass_scale: float, mot
     return hole
 
 
+def lensing_hole(location: Point, tilt: Point, spin: float, mass_scale: float, motion: str) -> bpy.types.Object:
+    """Add a black hole that bends the rays of the scene's camera (Output: Cycles Lens)."""
+    scene = bpy.context.scene
+    if bpy.ops.umbra.set_output(output="CYCLES_LENS") != {"FINISHED"}:
+        sys.exit("The Cycles Lens could not be set up; the reason is above.")
+    hole = black_hole(location, tilt, spin, mass_scale, motion)
+    scene.umbra.supersampling = "1"  # Cycles takes its samples anyway
+    return hole
+
+
 def group_node(scene: bpy.types.Scene) -> bpy.types.Node:
     """The black hole's node in the scene's compositor."""
     return next(node for node in scene.node_tree.nodes if node.name == "Umbra Black Hole")

@@ -6,6 +6,7 @@ The parameters are known here, so the bytecode and they are written into the cam
 """
 
 import hashlib
+import re
 import tempfile
 from collections.abc import Mapping
 from functools import cache
@@ -47,8 +48,17 @@ def bytecode(*, uses_map: bool) -> tuple[str, str]:
         source.write_text(f"#define {MAP_DEFINE}\n{text}" if uses_map else text, encoding="utf-8")
         if not _cycles.osl_compile(str(source), str(compiled)) or not compiled.is_file():
             raise SceneError("Cycles could not compile the lens camera's shader; please report it.")
-        code = compiled.read_text(encoding="utf-8")
+        code = without_origin(compiled.read_text(encoding="utf-8"))
     return code, hashlib.md5(code.encode(), usedforsecurity=False).hexdigest()
+
+
+def without_origin(code: str) -> str:
+    """Take out of bytecode what says where it comes from: comments, and the files and lines of instructions.
+
+    They name folders of this computer, and would make every session's code another one.
+    """
+    lines = (line for line in code.splitlines(keepends=True) if not line.startswith("#"))
+    return re.sub(r'%(filename\{"[^"]*"\}|line\{\d+\}) ?', "", "".join(lines))
 
 
 def write(camera: bpy.types.Camera, values: Mapping[str, object]) -> None:

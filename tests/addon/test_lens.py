@@ -330,6 +330,15 @@ def test_a_disk_that_is_not_drawn_is_named(scene, addon_module) -> None:
     assert sentence.startswith('The disk of "Hole" is drawn by the compositor alone')
 
 
+def test_bytecode_names_no_place(addon_module) -> None:
+    """It is saved with the camera, and must be the same in every session."""
+    for uses_map in (False, True):
+        code, _ = addon_module("lens_shader").bytecode(uses_map=uses_map)
+        assert "shader umbra_lens" in code
+        assert "/" not in code
+        assert "\\" not in code.replace("\\n", "")
+
+
 def test_another_engine_is_refused(scene) -> None:
     scene.render.engine = "BLENDER_WORKBENCH"
     with pytest.raises(RuntimeError, match="needs the render engine Cycles"):

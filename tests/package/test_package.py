@@ -142,7 +142,7 @@ def test_imports_only_what_blender_or_the_zip_brings(sources: dict[str, ast.Modu
     # In a checkout the add-on finds the physics beside it, under its plain name, and in one place only.
     extra = {"_physics.py": {"physics"}}
     # Blender's own Python modules, part of every Blender.
-    blender = {"addon_utils", "bl_ui", "bpy_extras", "gpu", "blf", "bmesh"}
+    blender = {"_cycles", "addon_utils", "bl_ui", "bpy_extras", "gpu", "blf", "bmesh"}
     for name, tree in sources.items():
         unknown = imported_modules(tree) - sys.stdlib_module_names - brought - extra.get(name, set())
         assert unknown <= (set() if name.startswith("physics/") else blender), name
