@@ -414,3 +414,72 @@ def test_directions_of_the_shader_are_those_of_the_map(
     assert clear.mean() > 0.3
     assert (wrong[clear] < allowed[clear]).all()
     assert np.median(wrong[clear]) < 5e-5
+
+
+@pytest.mark.parametrize("rays", ["IN_SHADER", "EXIT_MAP"])
+def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon_module, rays) -> None:
+    """A World of one colour, seen from a fast orbit: each pixel is that colour times the gain of its own 1 + z."""
+    physics, colour = addon_module("_physics").physics, addon_module("_physics").colour
+    scene.world = bpy.data.worlds.new("Uniform")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.5, 0.2, 1.0)
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+    add_lens(scene, 0.6, spin=0.9, motion="CIRCULAR")
+    scene.umbra.lens_rays, scene.umbra.sky_temperature = rays, 5000.0
+    scene.umbra.redshift_colour, scene.umbra.redshift_brightness = 0.7, 1.0
+    picture = render(scene, tmp_path / "shifted.exr", exr)[..., :3]
+    warp_map = physics.bake(addon_module("shot").read_at(scene, scene.frame_current).parameters)
+    clear = warp_map.visibility == 1.0
+    gain = colour.redshift_gain(warp_map.one_plus_z[clear].astype(float), 0.7, 1.0, 5000.0)
+    expected = gain * np.array([0.8, 0.5, 0.2])
+    assert expected[:, 0].max() > 1.5 * expected[:, 0].min()
+    # Single precision, and samples half a hundredth of a pixel off its centre.
+    assert picture[clear] == pytest.approx(expected, rel=5e-3)
+
+
+def test_an_animation_follows_the_camera_that_a_marker_binds(scene, tmp_path, exr) -> None:
+    """Two frames with two cameras, of which one moves: each is what it is when it is rendered alone."""
+    for place, radius in (((0.7, 6.0, 0.3), 1.0), ((-3.0, 20.0, 2.0), 3.0)):
+        add_ball(place, radius)
+    first = scene.camera
+    second = bpy.data.objects.new("Second", bpy.data.cameras.new("Second"))
+    scene.collection.objects.link(second)
+    second.location, second.rotation_euler = (1.0, -7.0, 0.5), (math.pi / 2, 0.0, 0.1)
+    for frame, height in ((1, 0.0), (3, 1.0)):
+        second.location.z = height
+        second.keyframe_insert("location", frame=frame)
+    for frame, camera in ((1, first), (2, second)):
+        scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+    add_lens(scene, 0.2, spin=0.9)
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.render.filepath = str(tmp_path / "frame_####.exr")
+    bpy.ops.render.render(animation=True)
+    pictures = [exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")[0] for frame in (1, 2, 3)]
+    assert np.abs(pictures[1] - pictures[2]).mean() > 1e-3
+    for frame, picture in enumerate(pictures, start=1):
+        scene.frame_set(frame)
+        alone = render(scene, tmp_path / "alone.exr", exr)
+        assert np.abs(alone - picture).mean() < 1e-4
+    assert first.data.type == "CUSTOM"
+    scene.umbra.output = "COMPOSITOR"
+    assert (first.data.type, second.data.type) == ("PERSP", "PERSP")
+
+
+def test_a_gpu_without_shaders_is_named_and_the_cpu_renders_if_it_may(scene, tmp_path, exr, addon_module) -> None:
+    shader = addon_module("lens_shader")
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    kinds = [each[0] for each in preferences.get_device_types(bpy.context)]
+    others = [kind for kind in kinds if kind not in shader.DEVICES_WITH_SHADERS]
+    if not others:
+        pytest.skip("this Blender knows no GPU but through OptiX")
+    add_ball((0.7, 6.0, 0.3), 1.0)
+    add_lens(scene, 0.2)
+    before = preferences.compute_device_type
+    try:
+        preferences.compute_device_type, scene.cycles.device = others[0], "GPU"
+        assert "cannot run camera shaders: only OptiX can" in shader.device_problem(scene)
+        scene.umbra.cpu_fallback = True
+        assert render(scene, tmp_path / "cpu.exr", exr)[..., 0].max() > 0.5
+        assert scene.cycles.device == "GPU"
+    finally:
+        preferences.compute_device_type = before
