@@ -483,3 +483,30 @@ def test_a_gpu_without_shaders_is_named_and_the_cpu_renders_if_it_may(scene, tmp
         assert scene.cycles.device == "GPU"
     finally:
         preferences.compute_device_type = before
+
+
+def test_the_viewport_follows_the_camera_and_the_hole(scene, addon_module) -> None:
+    """What a viewport's update does: the camera's shader gets the new places, and an update that changes nothing of
+    them leaves the camera alone."""
+    hole = add_lens(scene, 0.2, spin=0.5)
+    shown = scene.camera.data.cycles_custom
+    scene.camera.location = (1.0, -8.0, 0.5)
+    bpy.context.view_layer.update()
+    assert tuple(shown["place"]) == pytest.approx((5.0, -40.0, 2.5), rel=1e-5)
+    hole.umbra.spin = 0.7
+    bpy.context.view_layer.update()
+    assert shown["spin"] == pytest.approx(0.7)
+    assert shown["broken"] == 0
+    updates = []
+    bpy.app.handlers.depsgraph_update_post.append(lambda *_: updates.append(1))
+    try:
+        scene.cursor.location = (1.0, 2.0, 3.0)
+        for _ in range(3):
+            bpy.context.view_layer.update()
+        assert len(updates) <= 3
+    finally:
+        bpy.app.handlers.depsgraph_update_post.pop()
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.camera.location.x = 2.0
+    bpy.context.view_layer.update()
+    assert shown["broken"] == 1
