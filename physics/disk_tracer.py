@@ -24,6 +24,7 @@ from .tracer import (
     blocks,
     check_settings,
     drain,
+    viewing_angles,
 )
 
 DEFAULT_CROSSINGS = 3
@@ -136,12 +137,7 @@ def trace_disk(
     """
     check_settings(tolerance, method, max_steps)
     check_disk_settings(crossings, method)
-    try:
-        theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
-    except (TypeError, ValueError) as error:
-        raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
-    if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
-        raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
+    theta, phi = viewing_angles(theta_rd, phi_rd)
     rays_from_camera(spin, observer, np.empty((0, 3)))  # a bad spin or place is an error with no rays as well
     found = Crossings.empty(crossings, theta.size)
     g = np.full((crossings, theta.size), np.nan)

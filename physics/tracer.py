@@ -219,12 +219,7 @@ def trace_rays(
     Cancelled
         When `cancel` returned true.
     """
-    try:
-        theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
-    except (TypeError, ValueError) as error:
-        raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
-    if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
-        raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
+    theta, phi = viewing_angles(theta_rd, phi_rd)
     fate = np.empty(theta.size, dtype=np.uint8)
     theta_cs, phi_cs, one_plus_z = np.empty((3, theta.size))
 
@@ -266,6 +261,17 @@ def trace_block(
     fate[sky] = np.where(resolved, Fate.SKY, Fate.UNRESOLVED)
     direction[:, sky] = found.T
     return fate, direction.T
+
+
+def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array]:
+    """Return viewing directions broadcast against each other, or raise BlackHoleError for what cannot be one."""
+    try:
+        theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
+    except (TypeError, ValueError) as error:
+        raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
+    if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
+        raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
+    return theta, phi
 
 
 def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS) -> None:
