@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,14 +276,9 @@ class DiskPainting:
     def _write_whole(self, tiles: Tiles, values: Array, order: int) -> None:
         """Write tiles that the disk covers wholly, from channels of shape (n, channels, side, side)."""
         radius, phi = 1.0 / values[:, U], wrapped(np.arctan2(values[:, SIN], values[:, COS]))
-        for i in range(len(tiles)):
-            top, left = tiles.row[i], tiles.column[i]
-            place = self._planes[order, :, top : top + tiles.side, left : left + tiles.side]
-            _, height, width = place.shape
-            place[0] = radius[i, :height, :width]
-            place[1] = phi[i, :height, :width]
-            place[2] = values[i, G, :height, :width]
-            place[3] = 1.0
+        channels: tuple[NDArray[np.floating[Any]], ...] = (radius, phi, values[:, G], np.ones_like(radius))
+        for plane, channel in zip(self._planes[order], channels, strict=True):
+            tiles.put(plane, channel)
 
     def _put(
         self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], values: Array, across: Array, down: Array

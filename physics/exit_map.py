@@ -130,12 +130,8 @@ class ExitPainting(Painting):
         lines = np.moveaxis(interpolate(coefficients, tiles.side, np.eye(6)), 0, -1)
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
-        for i in range(len(tiles)):
-            top, left = tiles.row[i], tiles.column[i]
-            place = (slice(top, top + tiles.side), slice(left, left + tiles.side))
-            height, width = self._one_plus_z[place].shape
-            self._lines[place] = lines[i, :height, :width]
-            self._one_plus_z[place] = one_plus_z[i, :height, :width]
+        tiles.put(self._lines, lines)
+        tiles.put(self._one_plus_z, one_plus_z)
 
     def _trace(self, tiles: Tiles, done: float, end: float) -> Generator[float, None, None]:
         """Fill tiles by a ray for each pixel's centre, yielding fractions from `done` to `end`."""
@@ -158,19 +154,19 @@ class ExitPainting(Painting):
         self._rays += len(columns)
 
 
-def interpolable(lines: NDArray[np.float32], tolerance: float) -> NDArray[np.bool_]:
+def interpolable(lines: NDArray[np.floating[Any]], tolerance: float) -> NDArray[np.bool_]:
     """Return where values may be interpolated bilinearly to within `tolerance`, shape (height, width).
 
     Between the four centres of a cell the error is up to (|f_xx| + |f_yy|) / 8 in units of pixels; second differences
     stand for the derivatives, those of the neighbours at the picture's sides. False where they are not finite.
     """
     height, width = lines.shape[:2]
-    bend = np.zeros((height, width))
+    bend, lines = np.zeros((height, width)), lines.astype(np.float64)
     with np.errstate(invalid="ignore"):
         for axis, count in ((0, height), (1, width)):
             if count < 3:
                 return np.zeros((height, width), dtype=bool)
-            along = np.linalg.norm(np.diff(lines.astype(np.float64), n=2, axis=axis), axis=-1)
+            along = np.linalg.norm(np.diff(lines, n=2, axis=axis), axis=-1)
             bend += np.pad(along, [(1, 1) if each == axis else (0, 0) for each in (0, 1)], mode="edge")
         good: NDArray[np.bool_] = bend / 8.0 <= tolerance
     return good

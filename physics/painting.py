@@ -196,14 +196,8 @@ class Painting:
         phi = wrapped(np.arctan2(y, x))
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
-        for i in range(len(tiles)):
-            top, left = tiles.row[i], tiles.column[i]
-            place = (slice(top, top + tiles.side), slice(left, left + tiles.side))
-            height, width = self._theta[place].shape
-            self._theta[place] = theta[i, :height, :width]
-            self._phi[place] = phi[i, :height, :width]
-            self._one_plus_z[place] = one_plus_z[i, :height, :width]
-            self._visibility[place] = 1.0
+        for plane, values in zip(self.planes, (theta, phi, one_plus_z, np.ones_like(theta)), strict=True):
+            tiles.put(plane, values)
 
     # --- pixel by pixel ------------------------------------------------------------------------------
 

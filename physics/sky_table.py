@@ -27,7 +27,7 @@ from .rays import Array, rays_from_triad
 from .shot import WarpMapParameters
 from .sphere import by_component, cos_sin
 from .tracer import BLOCK_SIZE, Fate, trace_block
-from .trapped import edge_function
+from .trapped import around_hole, edge_angles
 
 # Position angles of the grid, and the step of s.
 ANGLES = 512
@@ -48,7 +48,8 @@ ERROR_SHARE = 0.1
 # what the edge moves, which must be well below the error.
 PLACE_DIGITS = 11
 
-BISECTIONS = 53
+# How well the edge's place is found, radians: as well as double precision has it.
+EDGE_ERROR = math.pi * 2.0**-53
 NEWTON_ROUNDS = 60
 
 Place = tuple[float, float, float, float, float, str]
@@ -63,13 +64,13 @@ def sky_table_steps(parameters: WarpMapParameters) -> Generator[float, None, Sky
     place = spin, r, theta, error, tolerance, method = _place(parameters)
     fido = Observer.fido(r, theta, 0.0)
     aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False, dtype=np.float64))
-    edge = _edge_angles(spin, fido, aside, up)
+    edge = edge_angles(spin, fido, aside, up, EDGE_ERROR)
     closest = CLOSEST * float(edge.max())
     first = math.log(closest) + closest
     count = math.ceil((math.log(math.pi) + math.pi - first) / STEP) + len(ALONG)
     delta = _distances(first + STEP * (np.arange(count) + ALONG[0]))
     # Beyond the opposite point, where delta + edge passes pi, the same formula goes on down the other side.
-    looking = _looking(edge[:, None] + delta, aside[:, None], up[:, None]).reshape(-1, 3)
+    looking = around_hole(edge[:, None] + delta, aside[:, None], up[:, None]).reshape(-1, 3)
     directions = np.empty((3, len(looking)))
     for start in range(0, len(looking), BLOCK_SIZE):
         block = slice(start, start + BLOCK_SIZE)
@@ -145,22 +146,6 @@ def _place(parameters: WarpMapParameters) -> Place:
         parameters.tolerance,
         parameters.method,
     )
-
-
-def _edge_angles(spin: float, fido: Observer, aside: Array, up: Array) -> Array:
-    """Return the angles from the hole's direction to the shadow's edge, radians, by bisection; shape of `aside`."""
-    low, high = np.zeros(len(aside)), np.full(len(aside), math.pi)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        sky = edge_function(rays_from_triad(spin, fido, _looking(middle, aside, up))) > 0.0
-        low, high = np.where(sky, low, middle), np.where(sky, middle, high)
-    return high
-
-
-def _looking(away: Array, aside: Array, up: Array) -> Array:
-    """Return unit vectors on the triad at an angle from the hole's direction, towards a position angle."""
-    cosine, sine = cos_sin(away)
-    return by_component(-cosine, sine * aside, sine * up)
 
 
 def _distances(s: NDArray[np.floating[Any]]) -> Array:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,13 @@ class Tiles:
         """Return the columns, shape (n, 1, side), and rows, shape (n, side, 1), of the tiles' pixels."""
         steps = np.arange(self.side)
         return self.column[:, None, None] + steps, self.row[:, None, None] + steps[:, None]
+
+    def put(self, image: NDArray[Any], values: NDArray[Any]) -> None:
+        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it."""
+        for i in range(len(self)):
+            top, left = self.row[i], self.column[i]
+            place = image[top : top + self.side, left : left + self.side]
+            place[...] = values[i, : place.shape[0], : place.shape[1]]
 
     def within(self, width: int, height: int) -> Tiles:
         """Return the tiles that hold any pixel of the picture."""

@@ -22,8 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import BlackHoleError
 from .metric import check_spin, circular_photon_radius, horizon_radius
-from .rays import Array, Indices, Rays
-from .sphere import cos_sin
+from .observer import Observer
+from .rays import Array, Indices, Rays, rays_from_triad
+from .sphere import by_component, cos_sin
 
 # Newton's method at most doubles its digits: this many rounds serve any start.
 NEWTON_ROUNDS = 60
@@ -125,6 +126,28 @@ def edge_function(rays: Rays) -> Array:
         # P of Eq. 3 bounds |X|: divided by it, the function stays bounded however large b and q grow.
         bound = r * r + a * a - a * rays.b
         return np.where(rays.escapes, margin / bound, -1.0)
+
+
+def around_hole(away: Array, aside: Array, up: Array) -> Array:
+    """Return unit vectors on a FIDO's triad, shape (..., 3), at angles from the hole's direction, in radians, towards
+    position angles with cosine `aside` (theta-hat) and sine `up` (phi-hat)."""
+    cosine, sine = cos_sin(away)
+    return by_component(-cosine, sine * aside, sine * up)
+
+
+def edge_angles(spin: float, fido: Observer, aside: Array, up: Array, error: float) -> Array:
+    """Return the angles from the hole's direction to the shadow's edge in a FIDO's sky, radians, by bisection.
+
+    The shadow surrounds the hole's direction, and each great circle from there to the opposite point, which is sky,
+    crosses its edge once. The answer lies on the sky's side, within `error` radians; for `aside` and `up` see
+    `around_hole`.
+    """
+    low, high = np.zeros(len(aside)), np.full(len(aside), math.pi)
+    for _ in range(math.ceil(math.log2(math.pi / error))):
+        middle = 0.5 * (low + high)
+        sky = edge_function(rays_from_triad(spin, fido, around_hole(middle, aside, up))) > 0.0
+        low, high = np.where(sky, low, middle), np.where(sky, middle, high)
+    return high
 
 
 def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:

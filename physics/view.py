@@ -17,13 +17,12 @@ from .rays import (
     camera_triad,
     light_in_fido_frame,
     rays_from_axes,
-    rays_from_triad,
     redshift_vector,
 )
 from .shot import WarpMapParameters
-from .sphere import by_component, cos_sin, spherical_triad
+from .sphere import cos_sin, spherical_triad
 from .tracer import BLOCK_SIZE
-from .trapped import edge_function
+from .trapped import around_hole, edge_angles, edge_function
 
 # Points on the shadow's outline, for the square root of the picture's width and height in pixels. Chords between n
 # points stray from it by (2 pi / n)^2 / 8 of its radius: 0.05 pixels where that is width and height together. What the
@@ -110,25 +109,12 @@ class View:
         return None if np.isnan(x[0]) else (float(x[0]), float(y[0]))
 
     def outline(self) -> tuple[Array, Array]:
-        """Return map pixel coordinates along the shadow's edge, in order, shape (n,); NaN where not in view.
-
-        In the FIDO's sky the shadow surrounds the hole's direction, and each great circle from there to the
-        opposite point, which is sky, crosses its edge once.
-        """
+        """Return map pixel coordinates along the shadow's edge, in order, shape (n,); NaN where not in view."""
         count = math.ceil(OUTLINE_DENSITY * math.sqrt((self._camera.width + self._camera.height) / self._per_pixel))
         aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
         fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
-
-        def looking(angle: Array) -> Array:
-            cosine, sine = cos_sin(angle)
-            return by_component(-cosine, sine * aside, sine * up)
-
-        low, high = np.zeros(count), np.full(count, math.pi)
-        for _ in range(math.ceil(math.log2(math.pi / (OUTLINE_ERROR * self._pixel_angle)))):
-            middle = 0.5 * (low + high)
-            sky = edge_function(rays_from_triad(self._spin, fido, looking(middle))) > 0.0
-            low, high = np.where(sky, low, middle), np.where(sky, middle, high)
-        return self._pixels(looking(high))
+        away = edge_angles(self._spin, fido, aside, up, OUTLINE_ERROR * self._pixel_angle)
+        return self._pixels(around_hole(away, aside, up))
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""
