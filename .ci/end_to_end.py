@@ -11,6 +11,7 @@ exit status 1.
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -36,11 +37,15 @@ TOLERANCE = 1e-4
 
 
 class Blender:
-    """A real Blender executable with user resources of its own."""
+    """A real Blender executable with user resources of its own, run in `folder`.
 
-    def __init__(self, executable: str, resources: Path) -> None:
-        self.executable = executable
-        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(resources)}
+    Nothing outside of that folder is named to it, so an executable in a container needs to see no more than that.
+    """
+
+    def __init__(self, executable: str, folder: Path) -> None:
+        self.executable = os.path.abspath(shutil.which(executable) or executable)
+        self.folder = folder
+        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "resources")}
 
     def run(self, *arguments: str | Path, status: int = 0) -> str:
         """Run it and return what it printed; any other exit status than the expected one ends the test."""
@@ -48,6 +53,7 @@ class Blender:
         print("$ blender", *map(str, arguments), flush=True)
         result = subprocess.run(
             command,
+            cwd=self.folder,
             env=self.environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -140,7 +146,7 @@ def main() -> None:
         sys.exit("Name a Blender executable: UMBRA_REAL_BLENDER=/path/to/blender")
     with tempfile.TemporaryDirectory(prefix="umbra-end-to-end-") as temporary:
         folder = Path(temporary)
-        blender = Blender(executable, folder / "resources")
+        blender = Blender(executable, folder)
         print(blender.run("--version").splitlines()[0])
         (zip_file,) = build([current_platform()], folder)
         blender.run("--command", "extension", "install-file", "-r", "user_default", "-e", zip_file)
@@ -156,8 +162,9 @@ def main() -> None:
             "strength": STRENGTH,
             "ball_colour": BALL_COLOUR,
         }
+        scene_script = shutil.copy(SCENE_SCRIPT, folder)
         (folder / "settings.json").write_text(json.dumps(settings), encoding="utf-8")
-        blender.run("-b", "--python-exit-code", "1", "--python", SCENE_SCRIPT, "--", folder / "settings.json")
+        blender.run("-b", "--python-exit-code", "1", "--python", scene_script, "--", folder / "settings.json")
         blender.run("-b", scene, "-a")
         compare(folder, sky)
 
