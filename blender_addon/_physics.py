@@ -11,6 +11,7 @@ import importlib.util
 if importlib.util.find_spec(f"{__package__}.physics") is not None:
     from . import physics
     from .physics import (
+        accuracy,
         colour,
         disk_flux,
         disk_look,
@@ -28,6 +29,7 @@ if importlib.util.find_spec(f"{__package__}.physics") is not None:
 else:
     import physics  # type: ignore[no-redef]
     from physics import (  # type: ignore[no-redef]
+        accuracy,
         colour,
         disk_flux,
         disk_look,
@@ -44,6 +46,7 @@ else:
     )
 
 __all__ = [
+    "accuracy",
     "colour",
     "disk_flux",
     "disk_look",

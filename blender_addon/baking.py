@@ -10,6 +10,7 @@ from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
 
@@ -23,6 +24,8 @@ _baker = physics.MapBaker()
 
 # How long a step waits for a map that is being written, seconds.
 WAIT = 0.02
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -231,7 +234,9 @@ def finish(scene_name: str) -> None:
         sync.forget_loaded_map(scene)
 
 
-def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) -> Summary:
+def drain(
+    steps: Generator[Progress, None, Result], *, announce: bool = False, doing: str = "baking warp maps"
+) -> Result:
     """Run a bake to its end; with `announce`, each tenth of the work is printed."""
     told = -1
     while True:
@@ -242,4 +247,4 @@ def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) 
         tenth = int(progress.fraction * 10)
         if announce and tenth != told:
             told = tenth
-            print(f"Umbra: baking warp maps {progress.fraction:4.0%}  {progress.text}", flush=True)
+            print(f"Umbra: {doing} {progress.fraction:4.0%}  {progress.text}", flush=True)

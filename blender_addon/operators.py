@@ -235,6 +235,8 @@ class UMBRA_OT_remove_foreground(bpy.types.Operator):
 class BakeOperator:
     """Run a bake: at once in background and from scripts, beside the interface when invoked in a window."""
 
+    doing = "Baking warp maps"
+    stopped = "Baking was stopped; the maps that are finished stay."
     _steps: Generator | None = None
     _timer: bpy.types.Timer | None = None
 
@@ -260,7 +262,7 @@ class BakeOperator:
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        summary = baking.drain(self._start(context), announce=bpy.app.background)
+        summary = baking.drain(self._start(context), announce=bpy.app.background, doing=self.doing.lower())
         self._report(summary)
         return {"FINISHED"}
 
@@ -283,7 +285,7 @@ class BakeOperator:
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if (event.type == "ESC" and event.value == "PRESS") or _stop_asked:
-            self.report({"INFO"}, "Baking was stopped; the maps that are finished stay.")
+            self.report({"INFO"}, self.stopped)
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -309,7 +311,7 @@ class BakeOperator:
         running = progress
         context.window_manager.progress_update(progress.fraction)
         context.workspace.status_text_set(
-            f"Baking warp maps: {progress.text}, {progress.fraction:.0%} done.  Esc stops."
+            f"{self.doing}: {progress.text}, {progress.fraction:.0%} done.  Esc stops."
         )
         _redraw(context)
 
