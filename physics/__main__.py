@@ -10,6 +10,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from . import accuracy_command, disk_command
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
@@ -30,6 +32,9 @@ from .warp_map_file import read_warp_map, write_warp_map
 
 # Motions as they are spelled on a command line; "velocity" has no short form there.
 ORBITS = {motion.replace("_", "-"): motion for motion in MOTIONS if motion != "velocity"}
+
+# What infinities in a sky are taken as: the largest half-precision number, which they were once above.
+BRIGHTEST = 65504.0
 
 PICTURE_ENDINGS = (".png", ".exr")
 
@@ -165,6 +170,14 @@ def _render(options: argparse.Namespace) -> None:
     warp_map = read_warp_map(options.map)
     camera = warp_map.metadata["parameters"]["camera"]
     environment, _ = read_exr(options.sky)
+    broken = ~np.isfinite(environment)
+    if broken.any():
+        count = int(broken.any(axis=-1).sum())
+        print(
+            f"note: {count} pixels of the sky are no finite numbers; they are taken as black or very bright",
+            file=sys.stderr,
+        )
+        environment = np.nan_to_num(environment, nan=0.0, posinf=BRIGHTEST, neginf=0.0)
     if environment.shape[1] != 2 * environment.shape[0]:
         print("note: the sky is not twice as wide as high; is it an equirectangular panorama?", file=sys.stderr)
     picture = render(

@@ -134,13 +134,13 @@ def accuracy_steps(
     if not environment_width >= 1:
         raise BlackHoleError(f"The environment's width is {environment_width}; it must be at least 1 pixel.")
     pixels = _read(path)
+    pixels.parameters.validate()
     disk = [_read_pass(each, path, pixels.parameters) for each in passes]
-    chosen = choose(pixels.kind, pixels.kind == SKY, pixels.direction, samples, seed)
-    yield 0.0
-    share = 1.0 / 3.0 if disk else 0.5
-    visibility = yield from _portion(_visibility(pixels.parameters, chosen), 0.0, share)
-    rays = yield from _portion(_trace(pixels, chosen), share, share)
-    judged = yield from _portion(_judge_passes(disk, pixels.parameters, chosen), 2.0 * share, share)
+    share = 0.25 if disk else 1.0 / 3.0
+    chosen = yield from _portion(choose(pixels.kind, pixels.kind == SKY, pixels.direction, samples, seed), 0.0, share)
+    visibility = yield from _portion(_visibility(pixels.parameters, chosen), share, share)
+    rays = yield from _portion(_trace(pixels, chosen), 2.0 * share, share)
+    judged = yield from _portion(_judge_passes(disk, pixels.parameters, chosen), 3.0 * share, share)
     return _report(path, pixels, chosen, visibility, rays, environment_width, judged)
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ from .rays import Array
 
 Mask = NDArray[np.bool_]
 Pixels = NDArray[np.intp]
+Image = NDArray[np.float32]
 
 # Of all samples, so many are spread evenly; the others lie at the shadow's edge, where neighbours differ most, and
 # where pixels do not fit their neighbours, in equal parts.
@@ -46,8 +48,10 @@ class Samples:
         return self.column[block].astype(np.float64) + 0.5, self.row[block].astype(np.float64) + 0.5
 
 
-def choose(kind: NDArray[np.uint8], whole: Mask, direction: NDArray[Any], count: int, seed: int) -> Samples:
-    """Choose pixels of a map.
+def choose(
+    kind: NDArray[np.uint8], whole: Mask, direction: NDArray[Any], count: int, seed: int
+) -> Generator[float, None, Samples]:
+    """Choose pixels of a map; yields the fraction done as it looks through the map, and returns them.
 
     Parameters
     ----------
@@ -70,12 +74,13 @@ def choose(kind: NDArray[np.uint8], whole: Mask, direction: NDArray[Any], count:
     even = _spread(width, height, round(EVEN_SHARE * count), random)
     each = max(1, (count - len(even)) // 3)
     near = np.flatnonzero(_near_edge(kind))
-    steps, odd = _unevenness(whole, direction)
+    steps, odd = yield from _unevenness(whole, direction)
+    steep = _largest(steps.ravel(), max(each, int(STEEP_SHARE * kind.size)))
     chosen = [
         even,
         random.permutation(near)[:each],
-        _largest(steps.ravel(), each - each // 2),
-        random.permutation(_largest(steps.ravel(), max(each, int(STEEP_SHARE * kind.size))))[: each // 2],
+        steep[_largest(steps.ravel()[steep], each - each // 2)],
+        random.permutation(steep)[: each // 2],
         _largest(odd.ravel(), each),
     ]
     pixels = np.unique(np.concatenate(chosen))
@@ -106,14 +111,14 @@ def _near_edge(kind: NDArray[np.uint8]) -> Mask:
     return near
 
 
-def _unevenness(whole: Mask, direction: NDArray[Any]) -> tuple[Array, Array]:
+def _unevenness(whole: Mask, direction: NDArray[Any]) -> Generator[float, None, tuple[Image, Image]]:
     """Return how far pixels are from the next, radians, and how badly they fit their neighbours, a ratio.
 
     Both of shape (height, width), 0 where there is nothing to compare. Only the pixel of each square that fits worst
     has a ratio, to what is usual in the square: next to the photon ring, few fit.
     """
     height, width = whole.shape
-    steps, odd = np.zeros((2, height, width))
+    steps, odd = np.zeros((2, height, width), np.float32)
     for top in range(0, height, SQUARE):
         first, last = max(top - REACH, 0), min(top + SQUARE + REACH, height)
         values = np.where(whole[first:last, :, None], direction[first:last].astype(np.float64), np.nan)
@@ -127,6 +132,7 @@ def _unevenness(whole: Mask, direction: NDArray[Any]) -> tuple[Array, Array]:
             if known.any():
                 row, column = np.unravel_index(np.where(known, block, 0.0).argmax(), block.shape)
                 odd[top + row, left + column] = block[row, column] / (np.median(block[known]) + SMALLEST_STEP)
+        yield rows.stop / height
     return steps, odd
 
 
@@ -158,8 +164,9 @@ def _misfit(values: Array) -> Array:
     return misfit
 
 
-def _largest(values: Array, count: int) -> Pixels:
+def _largest(values: Image, count: int) -> Pixels:
     """Return the indices of the `count` largest values that are above 0."""
-    count = min(count, values.size)
-    found: Pixels = np.argpartition(values, values.size - count)[values.size - count :]
-    return found[values[found] > 0.0]
+    found: Pixels = np.flatnonzero(values > 0.0)
+    if len(found) > count:
+        found = found[np.argpartition(values[found], len(found) - count)[len(found) - count :]]
+    return found
