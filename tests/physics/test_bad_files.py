@@ -296,7 +296,7 @@ def test_maps_with_channels_of_other_types_names_and_values(maps, tmp_path, kind
 
 @pytest.mark.parametrize(
     "parameters",
-    ["[]", "3", "null", "{}", "NaN", '{"camera": 3}', '{"camera": {"width": "24", "height": null}, "supersampling": 1}'],
+    ["[]", "3", "null", "{}", "NaN", '{"camera": 3}', '{"camera": {"width": "24"}, "supersampling": 1}'],
 )
 @pytest.mark.parametrize("kind", ["warp", "disk", "exit"])
 def test_headers_of_nonsense(maps, tmp_path, kind, parameters):
