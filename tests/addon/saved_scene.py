@@ -3,9 +3,9 @@
 
     python tests/addon/saved_scene.py CHECKOUT OUT.blend [--disk]
 
-with the Python that has Blender 4.5 (the oldest supported Blender: newer ones open its files) builds the scene with the
-add-on as it stands in CHECKOUT, a folder with any commit of this repository, and saves it. Only operators and properties
-that every version has are used here, by the names they were saved under.
+with the Python that has Blender 4.5 (the oldest supported one, whose files all others open) builds the scene with the
+add-on as it stands in CHECKOUT, a folder with any commit of this repository, and saves it. Only what every version has
+is used here, by the names it was saved under.
 """
 
 from __future__ import annotations
