@@ -26,6 +26,7 @@ from .exit_map_file import read_exit_map
 from .exr import PathLike, read_exr_header
 from .map_file import ATTRIBUTE_FORMAT
 from .painting import UNRESOLVED_ONE_PLUS_Z
+from .radial_path import winding
 from .rays import Array
 from .shot import WarpMapParameters
 from .sphere import unit_vectors
@@ -257,7 +258,8 @@ def _judge_passes(
         with np.errstate(all="ignore"):  # beyond a ray's end, where a pass holds nothing
             radius[:, block] = np.where(found.u > 0.0, 1.0 / found.u, np.inf)
             g[:, block] = light.g(parameters.spin, found.u, found.u_slope, parameters.disk.retrograde)
-        phi[:, block], lost[block] = found.phi, found.fate == Fate.UNRESOLVED
+            phi[:, block] = found.unwound + winding(parameters.spin, found.u)
+        lost[block] = found.fate == Fate.UNRESOLVED
         yield min(start + RAY_BLOCK, len(samples)) / len(samples)
     inner, outer = parameters.disk.radii(parameters.spin)
     judged = []

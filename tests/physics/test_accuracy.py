@@ -215,10 +215,10 @@ def test_disk_passes(tmp_path):
     report = check_accuracy(path, passes=paths, samples=1500)
     assert [one.crossing for one in report.disk] == [1, 2]
     assert report.disk[0].compared > 300
-    # Places on the disk may be wrong by 40 times what directions may, or 0.03 pixels of 1.1 degrees where the image is
-    # crowded, hence up to 6e-4; g follows.
+    # Where the image is crowded, places are promised to 0.03 pixels: of 1.1 degrees, seen from 40 M, 0.02 M. Elsewhere
+    # they are held to 2e-4; so all but a few are far better than this, which is about 0.02 M at the rings' radius.
     for one in report.disk:
-        assert max(one.radius, one.azimuth, one.g) < 1e-3
+        assert max(one.radius, one.azimuth, one.g) < 5e-3
         assert one.differing == 0
     first = baked.disk_passes[0]
     rows, columns = np.nonzero(first.coverage == 1.0)
