@@ -232,6 +232,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
             lens_sync.show_live(scene)
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
+            sync.repair(scene)
             sync.refresh(scene)
 
 

@@ -14,13 +14,19 @@ NO_MAP = "no_warp_map_0001.exr"
 ROTATION_SOCKET, STRENGTH_SOCKET = "Environment Rotation", "Environment Strength"
 
 
-def repair(scene: bpy.types.Scene) -> bool:
-    """Make the node group of an existing set-up whole and of this version; whether there was something to do."""
+def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
+    """Make the node group of an existing set-up whole and of this version; whether there was something to do.
+
+    Thorough: the group's inside is looked through as well, which takes up to a tenth of a second; else its sockets.
+    """
     setup = find_setup(scene)
     if setup is None or setup.tree.library is not None:
         return False
     tree = setup.group.node_tree
-    if tree is not None and node_group.is_group(tree) and node_group.is_current(tree):
+    inputs, outputs = setup.group.inputs, setup.group.outputs
+    whole = node_group.is_group(tree) and all(spec.name in inputs for spec in node_group.INPUTS)
+    whole = whole and all(spec.name in outputs for spec in node_group.OUTPUTS)
+    if whole and not (thorough and not node_group.is_current(tree)):
         return False
     setup.group.node_tree = node_group.ensure_group()
     return True
@@ -31,7 +37,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     setup = find_setup(scene)
     if setup is None:
         return
-    repair(scene)
+    repair(scene, thorough=False)
     disk_sync.refresh(scene)
     try:
         point_at_maps(scene)
