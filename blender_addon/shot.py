@@ -186,14 +186,14 @@ def camera_velocity(
         places = [np.array(each.evaluated_get(depsgraph).matrix_world.translation) for each in (camera, hole)]
         return np.subtract(places[0], places[1], dtype=np.float64)
 
-    with _frame_kept(scene):
+    with frame_kept(scene):
         before = separation(frame - 1, 0.5)
         after = separation(frame, 0.5)
     return (after - before) * rate
 
 
 @contextmanager
-def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Go back to the current frame afterwards, whatever happens."""
     frame, part = scene.frame_current, scene.frame_subframe
     try:
@@ -395,6 +395,6 @@ def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer 
         See `read`.
     """
     layer = view_layer or scene.view_layers[0]
-    with _frame_kept(scene):
+    with frame_kept(scene):
         scene.frame_set(frame)
         return read(scene, layer.depsgraph)

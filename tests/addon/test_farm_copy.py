@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machines that render without the add-on: every frame is the picture that the add-on renders, or is refused."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from small_scene import ROOT, add_hole, read, run_python, shrink
+
+FRAMES = (1, 3)
+SCRIPT = ROOT / "blender_addon" / "farm" / "umbra_farm.py"
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning")
+
+
+@pytest.fixture
+def exr(addon_module: Callable[[str], ModuleType]) -> ModuleType:
+    return addon_module("_physics").exr
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    """A small scene with a hole, three frames long, whose camera moves."""
+    scene = bpy.context.scene
+    shrink(scene)
+    add_hole(scene)
+    scene.frame_start, scene.frame_end = FRAMES
+    scene.umbra.map_folder = "//umbra_maps/"
+    for frame, x in zip(FRAMES, (7.4, 6.0), strict=True):
+        scene.camera.location.x = x
+        scene.camera.keyframe_insert("location", frame=frame)
+    return scene
+
+
+def animate_exposure(scene: bpy.types.Scene) -> None:
+    """Give the hole a disk that fades."""
+    disk = scene.umbra.active_hole.umbra.disk
+    disk.enabled = True
+    for frame, exposure in zip(FRAMES, (0.0, -3.0), strict=True):
+        disk.exposure = exposure
+        disk.keyframe_insert("exposure", frame=frame)
+
+
+def use_lens(scene: bpy.types.Scene) -> None:
+    """Bend the camera's rays, with a spin that is animated; half the frames are another camera's."""
+    hole = scene.umbra.active_hole
+    for frame, spin in zip(FRAMES, (0.9, 0.5), strict=True):
+        hole.umbra.spin = spin
+        hole.umbra.keyframe_insert("spin", frame=frame)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=3.0, location=(-9.0, 9.0, -6.0))
+    second = bpy.data.objects.new("Second", bpy.data.cameras.new("Second"))
+    second.location = (0.0, 0.0, 12.0)
+    scene.collection.objects.link(second)
+    for frame, camera in ((1, scene.camera), (3, second)):
+        scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+    assert bpy.ops.umbra.set_output(output="CYCLES_LENS") == {"FINISHED"}
+    scene.umbra.lens_rays = "IN_SHADER"
+
+
+def save(tmp_path: Path) -> Path:
+    blend = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    return blend
+
+
+def render_all(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> list[np.ndarray]:
+    scene.render.filepath = str(tmp_path / "with_####")
+    bpy.ops.render.render(animation=True)
+    return [read(tmp_path / f"with_{frame:04d}.exr", exr) for frame in (1, 2, 3)]
+
+
+def render_without_addon(blend: Path, tmp_path: Path, arguments: str = "render --output={}"):
+    """What the script says in a Blender where the extension is not installed."""
+    given = arguments.format(tmp_path / "without_####").split()
+    return run_python(
+        f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n"
+        "assert not hasattr(bpy.types.Scene, 'umbra')\n"
+        f"import runpy\nsys.argv[1:] = {['--', *given]!r}\n"
+        f"runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n",
+        resources=tmp_path / "empty",
+    )
+
+
+def without_addon(blend: Path, tmp_path: Path, exr: ModuleType) -> list[np.ndarray]:
+    result = render_without_addon(blend, tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "openjd_progress: 100.0" in result.stdout
+    return [read(tmp_path / f"without_{frame:04d}.exr", exr) for frame in (1, 2, 3)]
+
+
+def differ(pictures: list[np.ndarray]) -> bool:
+    """Whether each picture differs visibly from the one after it."""
+    return all(np.abs(a - b).max() > 0.05 for a, b in zip(pictures, pictures[1:], strict=False))
+
+
+def test_a_disk_that_stays_needs_no_copy(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> None:
+    scene.umbra.active_hole.umbra.disk.enabled = True
+    save(tmp_path)
+    pictures = render_all(scene, tmp_path, exr)
+    bpy.ops.wm.save_mainfile()
+    assert differ(pictures)
+    for ours, theirs in zip(pictures, without_addon(tmp_path / "shot.blend", tmp_path, exr), strict=True):
+        np.testing.assert_array_equal(theirs, ours)
+
+
+@pytest.mark.parametrize("change", [animate_exposure, use_lens])
+def test_the_copy_renders_alike(
+    scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, change: Callable[[bpy.types.Scene], None]
+) -> None:
+    change(scene)
+    blend = save(tmp_path)
+    pictures = render_all(scene, tmp_path, exr)
+    assert differ(pictures)
+    bpy.ops.wm.save_mainfile()
+    assert bpy.ops.umbra.save_farm_copy() == {"FINISHED"}
+    for ours, theirs in zip(pictures, without_addon(tmp_path / "shot_farm.blend", tmp_path, exr), strict=True):
+        np.testing.assert_array_equal(theirs, ours)
+
+    refused = render_without_addon(blend, tmp_path)
+    assert refused.returncode == 1
+    assert "openjd_fail: This file needs the add-on in each frame" in refused.stdout
+    refused = render_without_addon(tmp_path / "shot_farm.blend", tmp_path, "check --frames=2-4")
+    assert refused.returncode == 1
+    assert "Frame 4 is not in this farm copy, which has 1 to 3" in refused.stderr
+
+
+@pytest.mark.parametrize("change", [animate_exposure, use_lens])
+def test_the_open_file_stays_as_it_is(
+    scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, change: Callable[[bpy.types.Scene], None]
+) -> None:
+    """Same actions, drivers and pictures, and nothing left over; the copy renders alike with the add-on too."""
+    change(scene)
+    save(tmp_path)
+    before = render_all(scene, tmp_path, exr)
+    actions = {each.name: each.users for each in bpy.data.actions}
+    assert bpy.ops.umbra.save_farm_copy() == {"FINISHED"}
+    assert {each.name: each.users for each in bpy.data.actions} == actions
+    assert "umbra_farm_frames" not in scene
+    np.testing.assert_array_equal(render_all(scene, tmp_path, exr), before)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot_farm.blend"))
+    np.testing.assert_array_equal(render_all(bpy.context.scene, tmp_path, exr), before)
+
+
+def test_what_cannot_be_copied_is_said(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="not saved yet"):
+        bpy.ops.umbra.save_farm_copy()
+    world = scene.world.driver_add("color", 0).driver
+    variable = world.variables.new()
+    variable.name = "spin"
+    variable.targets[0].id, variable.targets[0].data_path = scene.umbra.active_hole, "umbra.spin"
+    world.expression = "spin * 2"
+    save(tmp_path)
+    with pytest.raises(RuntimeError, match=r"The driver of .* works with settings of the black hole"):
+        bpy.ops.umbra.save_farm_copy()
+
+
+@pytest.mark.parametrize("harm", ["missing", "damaged"])
+def test_a_map_that_is_not_there_is_no_magenta_success(scene: bpy.types.Scene, tmp_path: Path, harm: str) -> None:
+    blend = save(tmp_path)
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    bpy.ops.wm.save_mainfile()
+    lost = tmp_path / "umbra_maps" / "Scene_Black_Hole_64x36_0002.exr"
+    if harm == "missing":
+        lost.unlink()
+    else:
+        lost.write_bytes(b"not a picture")
+    refused = render_without_addon(blend, tmp_path)
+    assert refused.returncode == 1
+    assert f"openjd_fail: Frame 2: the map {lost} is {harm}" in refused.stdout
+    assert not list(tmp_path.glob("without_*"))
+    assert render_without_addon(blend, tmp_path, "check --frames=1,3").returncode == 0
