@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import bpy
 
-from . import disk_panel, handlers, operators, panels, properties
+from . import command, disk_panel, handlers, operators, panels, properties
 
 _CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *disk_panel.CLASSES)
 
@@ -23,7 +23,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, handlers):
+        for module in (properties, operators, handlers, command):
             module.register()
             _undo.append(module.unregister)
     except BaseException:
