@@ -8,7 +8,7 @@ datablock since the last time. So it holds names, and looks the scene up each ti
 import functools
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import bpy
@@ -20,6 +20,9 @@ from .errors import SceneError
 
 # What the maps of one bake or render have in common is kept here.
 _baker = physics.MapBaker()
+
+# What comes of a frame: its map was baked here, or held already.
+BAKED, KEPT = "baked", "kept"
 
 # How long a step waits for a map that is being written, seconds.
 WAIT = 0.02
@@ -33,6 +36,8 @@ class Progress:
     fraction: float
     """Share of all the work that is done, 0..1."""
     text: str
+    outcome: str | None = None
+    """`BAKED` or `KEPT` where the frame is done."""
 
 
 @dataclass
@@ -146,6 +151,15 @@ def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
 
 
+def map_at(
+    scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None
+) -> "tuple[Path, physics.WarpMapParameters]":
+    """Where the map of any frame lies, or will lie, and what it is made from; see `shot.read_at`."""
+    layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+    frame_shot = shot.read_at(scene, frame, layer)
+    return path_of(scene, frame_shot), parameters_of(scene, frame_shot)
+
+
 def bake_frames(
     scene_name: str, frames: Iterable[int], view_layer_name: str | None = None
 ) -> Generator[Progress, None, Summary]:
@@ -161,7 +175,7 @@ def bake_frames(
     frames : iterable of int
         Frames in the order of baking.
     view_layer_name : str, optional
-        The view layer whose objects count; the scene's first by default.
+        The view layer whose objects count; the first that is rendered by default.
 
     Raises
     ------
@@ -170,21 +184,20 @@ def bake_frames(
     """
     wanted = list(frames)
     summary = Summary()
+    written: Progress | None = None
     with physics.Background() as writing:
         for index, frame in enumerate(wanted):
             scene = bpy.data.scenes.get(scene_name)
             if scene is None:
                 raise SceneError(f'Scene "{scene_name}" is gone: baking has stopped.')
             text = f"Frame {frame}" + (f" ({index + 1} of {len(wanted)})" if len(wanted) > 1 else "")
-            with _naming(frame, len(wanted)):
-                layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
-                frame_shot = shot.read_at(scene, frame, layer)
-                parameters = parameters_of(scene, frame_shot)
-                path = path_of(scene, frame_shot)
+            with naming(frame, len(wanted)):
+                path, parameters = map_at(scene, frame, view_layer_name)
                 summary.folder = maps.folder(scene)
                 yield Progress(frame, index / len(wanted), text)
                 if maps.is_fresh(path, parameters):
                     summary.reused.append(frame)
+                    yield Progress(frame, (index + 1) / len(wanted), text, KEPT)
                     continue
                 steps = _steps(path, parameters)
                 while True:
@@ -197,16 +210,21 @@ def bake_frames(
             summary.unresolved += baked.counts.get("unresolved", 0)
             while not writing.wait(WAIT):
                 yield Progress(frame, (index + 1) / len(wanted), text)
+            if written is not None:
+                yield replace(written, fraction=(index + 1) / len(wanted))
             writing.start(functools.partial(_write, path, baked, frame, len(wanted)))
+            written = Progress(frame, (index + 1) / len(wanted), text, BAKED)
             summary.baked.append(frame)
         while not writing.wait(WAIT):
             yield Progress(wanted[-1], 1.0, "Writing")
+        if written is not None:
+            yield replace(written, fraction=1.0)
     finish(scene_name)
     return summary
 
 
 @contextmanager
-def _naming(frame: int, count: int) -> Iterator[None]:
+def naming(frame: int, count: int) -> Iterator[None]:
     """Name the frame in what goes wrong, where there are several."""
     try:
         yield
@@ -218,7 +236,7 @@ def _naming(frame: int, count: int) -> Iterator[None]:
 
 
 def _write(path: Path, baked: "physics.WarpMap | exit_map.ExitMap", frame: int, count: int) -> None:
-    with _naming(frame, count):
+    with naming(frame, count):
         _save(path, baked)
 
 

@@ -16,6 +16,7 @@ import bpy
 from . import foreground, lens_camera, lens_shader, lens_sync, maps, shot
 from .errors import SceneError
 from .operators import reporting
+from .properties import IN_SHADER
 
 SUFFIX = "_farm"
 # On the scene, in the copy: the first and last frame that have keyframes. `farm/umbra_farm.py` reads it.
@@ -66,28 +67,32 @@ def _read(
     """All values by frame, and the parameters of each camera with a lens at the first of its frames."""
     tracks: Tracks = defaultdict(dict)
     lenses: dict[bpy.types.Camera, dict[str, object]] = {}
-    for frame in frames:
-        frame_shot = shot.read_at(scene, frame)
-        with shot.frame_kept(scene):
+    layer = next((each for each in scene.view_layers if each.use), scene.view_layers[0])
+    current = scene.frame_current
+    try:
+        for frame in frames:
             scene.frame_set(frame)
             for owner, curve in drivers:
                 tracks[owner, curve.data_path, curve.array_index][frame] = _source_value(owner, curve)
-            if not lens_sync.is_on(scene):
-                continue
-            camera = lens_sync.camera_of(scene)
-            values = lens_sync.values_of(scene, frame_shot)
-            lenses.setdefault(camera, values)
-            for name, value in values.items():
-                for index, number in enumerate(value if isinstance(value, tuple) else (value,)):
-                    tracks[camera, f'cycles_custom["{name}"]', index][frame] = number
-            if scene.umbra.foreground_scene is not None:
-                _read_foreground(scene, frame, tracks)
+            if lens_sync.is_on(scene):
+                camera = lens_sync.camera_of(scene)
+                values = lens_sync.values_of(scene, shot.read(scene, layer.depsgraph))
+                lenses.setdefault(camera, values)
+                _read_lens(scene, frame, values, tracks)
+    finally:
+        scene.frame_set(current)
     return {track: values for track, values in tracks.items() if len(set(values.values())) > 1}, lenses
 
 
-def _read_foreground(scene: bpy.types.Scene, frame: int, tracks: Tracks) -> None:
-    """The plain camera of the foreground follows the camera of the lens."""
-    camera, plain = scene.camera.data, scene.umbra.foreground_scene.camera.data
+def _read_lens(scene: bpy.types.Scene, frame: int, parameters: dict[str, object], tracks: Tracks) -> None:
+    """The lens of a frame; the plain camera of the foreground follows it."""
+    camera = scene.camera.data
+    for name, value in parameters.items():
+        for index, number in enumerate(value if isinstance(value, tuple) else (value,)):
+            tracks[camera, f'cycles_custom["{name}"]', index][frame] = number
+    if scene.umbra.foreground_scene is None:
+        return
+    plain = scene.umbra.foreground_scene.camera.data
     for prefix, owner, names in (
         ("", camera, foreground.CAMERA_SETTINGS),
         ("dof.", camera.dof, foreground.DEPTH_OF_FIELD),
@@ -138,9 +143,11 @@ def _written(
     """Have all that in the open file while it is saved, and nothing of it afterwards."""
     muted = [curve for _owner, curve in drivers if not curve.mute]
     device = getattr(scene.render, "compositor_device", None)
+    rays = scene.umbra.lens_rays
     made = []
     try:
         scene[FRAMES] = [frames[0], frames[-1]]
+        scene.umbra.lens_rays = IN_SHADER  # so that a machine with the add-on renders the same
         if device is not None:
             scene.render.compositor_device = "CPU"  # without a display there is usually no OpenGL
         for curve in muted:
@@ -157,6 +164,7 @@ def _written(
             curve.mute = False
         if device is not None:
             scene.render.compositor_device = device
+        scene.umbra.lens_rays = rays
         del scene[FRAMES]
         if lenses:
             lens_sync.show_live(scene)

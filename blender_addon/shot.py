@@ -186,14 +186,14 @@ def camera_velocity(
         places = [np.array(each.evaluated_get(depsgraph).matrix_world.translation) for each in (camera, hole)]
         return np.subtract(places[0], places[1], dtype=np.float64)
 
-    with frame_kept(scene):
+    with _frame_kept(scene):
         before = separation(frame - 1, 0.5)
         after = separation(frame, 0.5)
     return (after - before) * rate
 
 
 @contextmanager
-def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Go back to the current frame afterwards, whatever happens."""
     frame, part = scene.frame_current, scene.frame_subframe
     try:
@@ -387,14 +387,14 @@ def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer 
     frame : int
         The frame to read.
     view_layer : ViewLayer, optional
-        The layer whose objects count; the scene's first by default.
+        The layer whose objects count; the first that is rendered by default.
 
     Raises
     ------
     physics.BlackHoleError
         See `read`.
     """
-    layer = view_layer or scene.view_layers[0]
-    with frame_kept(scene):
+    layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
+    with _frame_kept(scene):
         scene.frame_set(frame)
         return read(scene, layer.depsgraph)

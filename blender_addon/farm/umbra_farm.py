@@ -30,7 +30,8 @@ READ_BY_FRAME = re.compile(r"map|disk_pass_\d+")
 SEQUENCE_LENGTH = 1_000_000
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
-FAILURE = "Error: Umbra Black Hole: "
+# How sentences of failures begin: the add-on's while it renders, and those of its command.
+FAILURE, COMMAND_FAILURE = "Error: Umbra Black Hole: ", "error: "
 SHARE = re.compile(r"(\d+)\s?%")
 
 
@@ -231,8 +232,8 @@ def bake(frames: list[int], blender: str, file: str) -> None:
         if share is not None:
             tell("progress", float(share[1]))
             tell("status", text.removeprefix("Umbra: "))
-        elif text.startswith(FAILURE):
-            failure = text.removeprefix(FAILURE)
+        elif text.startswith(COMMAND_FAILURE):
+            failure = text.removeprefix(COMMAND_FAILURE)
     if process.wait() != 0:
         raise Fault(failure or f"Baking ended with exit status {process.returncode}: the lines above say why.")
     tell("progress", 100.0)
