@@ -32,7 +32,8 @@ EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 # How sentences of failures begin: the add-on's while it renders, and those of its command.
 FAILURE, COMMAND_FAILURE = "Error: Umbra Black Hole: ", "error: "
-SHARE = re.compile(r"(\d+)\s?%")
+# A line of that command for each frame that is done.
+FRAME_DONE = re.compile(r"Umbra: .*(Frame -?\d+).*: (baked|still valid)")
 
 
 class Fault(Exception):
@@ -224,19 +225,19 @@ def bake(frames: list[int], blender: str, file: str) -> None:
         )
     except OSError as error:
         raise Fault(f"Blender could not be started as {blender} ({error.strerror}): name its executable.") from error
-    failure = ""
+    failure, done = "", 0
     for line in process.stdout:
         print(line, end="", flush=True)
         text = line.strip()
-        share = SHARE.search(text) if text.startswith("Umbra: ") else None
-        if share is not None:
-            tell("progress", float(share[1]))
-            tell("status", text.removeprefix("Umbra: "))
+        match = FRAME_DONE.fullmatch(text)
+        if match is not None:
+            done += 1
+            tell("progress", f"{100.0 * done / len(frames):.1f}")
+            tell("status", f"{match[1]}: {match[2]}")
         elif text.startswith(COMMAND_FAILURE):
             failure = text.removeprefix(COMMAND_FAILURE)
     if process.wait() != 0:
         raise Fault(failure or f"Baking ended with exit status {process.returncode}: the lines above say why.")
-    tell("progress", 100.0)
 
 
 def main() -> None:

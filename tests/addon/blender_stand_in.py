@@ -5,11 +5,11 @@ Options take effect in their order, as Blender's do. The extension is enabled wh
 ask for factory settings.
 """
 
+import importlib
 import runpy
 import sys
 from pathlib import Path
 
-import addon_utils
 import bpy
 
 EXTENSION = "bl_ext.user_default.umbra_black_hole"
@@ -23,7 +23,7 @@ def run(arguments: list[str]) -> int:
     if "--factory-startup" not in arguments and (
         Path(bpy.utils.user_resource("EXTENSIONS")) / "user_default" / "umbra_black_hole"
     ).is_dir():
-        addon_utils.enable(EXTENSION, default_set=True)
+        importlib.import_module("addon_utils").enable(EXTENSION, default_set=True)
     python_status = 0
     rest = list(arguments)
     while rest and rest[0] != "--":
