@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from . import farm_copy, maps
+from . import farm_copy, maps, shot
 from ._physics import exr
 from .errors import SceneError
 from .operators import reporting
@@ -89,7 +89,10 @@ def _read(name: str) -> str:
 class UMBRA_OT_save_farm_templates(bpy.types.Operator):
     bl_idname = "umbra.save_farm_templates"
     bl_label = "Save Farm Templates..."
-    bl_description = "Write job templates for render farms (Open Job Description, Flamenco) and their script to a folder"
+    bl_description = (
+        "Write job templates for render farms (Open Job Description, Flamenco) and their script to a folder; and a "
+        "farm copy of this file where it needs one"
+    )
     bl_options = {"REGISTER"}
 
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
@@ -109,4 +112,25 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (UMBRA_OT_save_farm_templates,)
+class VIEW3D_PT_umbra_farm(bpy.types.Panel):
+    bl_label = "Render Farm"
+    bl_parent_id = "VIEW3D_PT_umbra"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Umbra"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return shot.find_active_hole(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column()
+        column.enabled = bool(bpy.data.filepath)
+        column.operator("umbra.save_farm_templates", icon="FILE_FOLDER")
+        column.operator("umbra.save_farm_copy", icon="DUPLICATE")
+        if not bpy.data.filepath:
+            self.layout.label(text="Save this file first.", icon="INFO")
+
+
+CLASSES = (UMBRA_OT_save_farm_templates, VIEW3D_PT_umbra_farm)

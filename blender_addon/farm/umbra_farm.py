@@ -105,16 +105,18 @@ def compositor_of(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
 def map_files(scene: bpy.types.Scene, frame: int) -> Iterator[Path]:
     """The files that the compositor reads for a frame: the warp map, and the disk's passes beside it."""
     tree = compositor_of(scene)
-    nodes = [] if tree is None else tree.nodes
-    if any(node.get(ROLE) == "group" and not node.mute for node in nodes):
-        for node in nodes:
-            if not READ_BY_FRAME.fullmatch(node.get(ROLE, "")) or node.image is None:
-                continue
-            if not any(output.is_linked for output in node.outputs):
-                continue
-            path = bpy.path.abspath(node.image.filepath, library=node.image.library)
-            beginning, number = re.fullmatch(r"(.*?)(\d*)", str(Path(path).with_suffix(""))).groups()
-            yield Path(f"{beginning}{frame % SEQUENCE_LENGTH:0{len(number)}d}{Path(path).suffix}")
+    for node in [] if tree is None else tree.nodes:
+        if not READ_BY_FRAME.fullmatch(node.get(ROLE, "")) or node.image is None or not is_used(node):
+            continue
+        path = Path(bpy.path.abspath(node.image.filepath, library=node.image.library))
+        beginning, number = re.fullmatch(r"(.*?)(\d*)", path.stem).groups()
+        yield path.with_name(f"{beginning}{frame % SEQUENCE_LENGTH:0{len(number)}d}{path.suffix}")
+
+
+def is_used(node: bpy.types.Node) -> bool:
+    """Whether one of the add-on's groups reads the node, and is not muted."""
+    readers = [link.to_node for output in node.outputs for link in output.links]
+    return any(not each.mute and (each.get(ROLE) != "disk" or is_used(each)) for each in readers)
 
 
 def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
@@ -123,7 +125,9 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
     if known is not None:
         outside = [frame for frame in frames if not known[0] <= frame <= known[1]]
         if outside:
-            raise Fault(f"Frame {outside[0]} is not in this farm copy, which has {known[0]} to {known[1]}: save it anew.")
+            raise Fault(
+                f"Frame {outside[0]} is not in this farm copy, which has {known[0]} to {known[1]}: save it anew."
+            )
         return
     cameras = [scene.camera, *(marker.camera for marker in scene.timeline_markers)]
     lensed = any(each is not None and each.data is not None and LENS in each.data for each in cameras)
@@ -155,7 +159,7 @@ def check(frames: list[int]) -> None:
     for frame in frames:
         for path in map_files(scene, frame):
             if not path.is_file():
-                raise Fault(f"Frame {frame}: the map {path} is missing: bake it, or bring the folder of the maps along.")
+                raise Fault(f"Frame {frame}: the map {path} is missing: bake it, or bring the maps' folder along.")
             with path.open("rb") as file:
                 if file.read(len(EXR_MAGIC)) != EXR_MAGIC:
                     raise Fault(f"Frame {frame}: the map {path} is damaged: bake it again.")
@@ -165,15 +169,16 @@ def check(frames: list[int]) -> None:
 
 
 class Failures:
-    """Passes on what is written to it, and tells the scheduler of failures among it."""
+    """Passes on what is written to it, and tells the scheduler of the first failure among it."""
 
     def __init__(self, stream) -> None:
         self.stream = stream
+        self.told = False
 
     def write(self, text: str) -> int:
-        for line in text.splitlines():
-            if line.startswith(FAILURE):
-                tell("fail", line.removeprefix(FAILURE))
+        if text.startswith(FAILURE) and not self.told:
+            self.told = True
+            tell("fail", text.removeprefix(FAILURE).strip())
         return self.stream.write(text)
 
     def __getattr__(self, name: str) -> object:

@@ -2,12 +2,14 @@
 """Machines that render without the add-on: every frame is the picture that the add-on renders, or is refused."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 from small_scene import ROOT, add_hole, read, run_python, shrink
 
 FRAMES = (1, 3)
@@ -60,6 +62,20 @@ def use_lens(scene: bpy.types.Scene) -> None:
     scene.umbra.lens_rays = "IN_SHADER"
 
 
+def use_lens_with_foreground(scene: bpy.types.Scene) -> None:
+    """Zoom on a ball nearer than the hole, which a second scene renders unbent."""
+    scene.camera.animation_data_clear()
+    for frame, lens in zip(FRAMES, (50.0, 90.0), strict=True):
+        scene.camera.data.lens = lens
+        scene.camera.data.keyframe_insert("lens", frame=frame)
+    place = scene.camera.matrix_world @ Vector((0.0, 0.0, -1.5))
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.2, location=place)
+    assert bpy.ops.umbra.set_output(output="CYCLES_LENS") == {"FINISHED"}
+    scene.umbra.lens_rays = "IN_SHADER"
+    assert bpy.ops.umbra.set_up_foreground() == {"FINISHED"}
+    assert len(scene.umbra.foreground.objects) == 1
+
+
 def save(tmp_path: Path) -> Path:
     blend = tmp_path / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
@@ -93,7 +109,7 @@ def without_addon(blend: Path, tmp_path: Path, exr: ModuleType) -> list[np.ndarr
 
 def differ(pictures: list[np.ndarray]) -> bool:
     """Whether each picture differs visibly from the one after it."""
-    return all(np.abs(a - b).max() > 0.05 for a, b in zip(pictures, pictures[1:], strict=False))
+    return all(np.abs(a - b).max() > 0.05 for a, b in pairwise(pictures))
 
 
 def test_a_disk_that_stays_needs_no_copy(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> None:
@@ -106,7 +122,7 @@ def test_a_disk_that_stays_needs_no_copy(scene: bpy.types.Scene, tmp_path: Path,
         np.testing.assert_array_equal(theirs, ours)
 
 
-@pytest.mark.parametrize("change", [animate_exposure, use_lens])
+@pytest.mark.parametrize("change", [animate_exposure, use_lens, use_lens_with_foreground])
 def test_the_copy_renders_alike(
     scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, change: Callable[[bpy.types.Scene], None]
 ) -> None:
