@@ -11,6 +11,7 @@ import importlib.util
 if importlib.util.find_spec(f"{__package__}.physics") is not None:
     from . import physics
     from .physics import (
+        claim,
         colour,
         disk_flux,
         disk_look,
@@ -33,6 +34,7 @@ if importlib.util.find_spec(f"{__package__}.physics") is not None:
 else:
     import physics  # type: ignore[no-redef]
     from physics import (  # type: ignore[no-redef]
+        claim,
         colour,
         disk_flux,
         disk_look,
@@ -54,6 +56,7 @@ else:
     )
 
 __all__ = [
+    "claim",
     "colour",
     "disk_flux",
     "disk_look",

@@ -14,16 +14,13 @@ from pathlib import Path
 import bpy
 
 from . import baking, maps, shot
-from ._physics import exr, map_check, physics
+from ._physics import claim, map_check, physics
 from .errors import SceneError
 
 State = map_check.State
 
 # What a bake would replace.
 FAULTY = (State.STALE, State.FOREIGN, State.DAMAGED)
-
-# The folder's copies of maps, while a file is saved for the first time.
-_PART = ".part"
 
 
 @dataclass(frozen=True)
@@ -38,6 +35,8 @@ class FrameState:
     """Bytes."""
     superseded: tuple[Path, ...] = ()
     """Files of the same frame that its settings have no use for any more."""
+    baker: str | None = None
+    """The process that is baking it now."""
 
 
 @dataclass
@@ -47,7 +46,7 @@ class Listing:
     folder: Path
     frames: list[FrameState] = field(default_factory=list)
     leftovers: list[Path] = field(default_factory=list)
-    """Half files of processes that were killed."""
+    """What processes that were killed have left: half files, and claims."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -70,7 +69,7 @@ class Listing:
         found = ", ".join(f"{count} {state}" for state, count in self.counts.items() if count)
         text = f"{len(self.frames)} frames: {found or 'none'}; {self.size / 1e6:.1f} MB in {self.folder}"
         if self.leftovers:
-            text += f"; {len(self.leftovers)} half files of bakes that were killed"
+            text += f"; {len(self.leftovers)} files that killed bakes have left"
         return text + "."
 
 
@@ -89,14 +88,24 @@ class Cleaning:
 
     dry_run: bool
     removed: list[Removal] = field(default_factory=list)
+    in_use: list[Path] = field(default_factory=list)
+    """Files that stay, because a process is baking their frames."""
+
+    @property
+    def size(self) -> int:
+        """Bytes that were, or would be, freed."""
+        return sum(each.size for each in self.removed)
 
     def sentence(self) -> str:
         """One sentence for the artist."""
         if not self.removed:
-            return "Nothing to clean."
-        size = sum(each.size for each in self.removed) / 1e6
-        verb = "Would remove" if self.dry_run else "Removed"
-        return f"{verb} {len(self.removed)} file{'' if len(self.removed) == 1 else 's'}, {size:.1f} MB."
+            text = "Nothing to clean"
+        else:
+            verb = "Would remove" if self.dry_run else "Removed"
+            text = f"{verb} {len(self.removed)} file{'' if len(self.removed) == 1 else 's'}, {self.size / 1e6:.1f} MB"
+        if self.in_use:
+            text += f"; {len(self.in_use)} stay, because their frames are being baked"
+        return text + "."
 
 
 class FolderNames:
@@ -108,9 +117,8 @@ class FolderNames:
             re.escape(maps.names_of(scene, hole_name))
             + r"_(?P<size>\d+x\d+)_(?:disk(?P<crossing>\d+)_)?(?P<number>\d{4,7})(?P<exit>_exit_[0-9a-f]+)?\.exr"
         )
-        self.maps: list[str] = []
-        """Maps and passes, of whatever size and frame."""
-        self.leftovers: list[str] = []
+        self.maps: list[tuple[str, Path]] = []
+        """Maps and passes, of whatever size and frame, and the maps that they belong to."""
         self._by_frame: dict[tuple[str, int], list[re.Match[str]]] = {}
         try:
             names = sorted(os.listdir(self.folder))
@@ -121,16 +129,24 @@ class FolderNames:
         for name in names:
             match = self._pattern.fullmatch(name)
             if match is not None:
-                self.maps.append(name)
+                self.maps.append((name, self._owner(match)))
                 self._by_frame.setdefault((match["size"], int(match["number"])), []).append(match)
-            elif self._is_leftover(name):
-                self.leftovers.append(name)
+        self.leftovers = [
+            (path, self._owner(match))
+            for target, halves in maps.half_files(self.folder).items()
+            if (match := self._pattern.fullmatch(target))
+            for path in halves
+        ] + [
+            (self.folder / name, self._owner(match))
+            for name in names
+            if (target := claim.claimed_name(name)) and (match := self._pattern.fullmatch(target))
+        ]
+        """Half files and claims, of processes that live or not, and the maps that they belong to."""
 
-    def _is_leftover(self, name: str) -> bool:
-        target = exr.target_of(name)
-        if target is None and name.startswith(".") and name.endswith(_PART):
-            target = name.removeprefix(".").removesuffix(_PART)
-        return target is not None and self._pattern.fullmatch(target) is not None
+    def _owner(self, match: re.Match[str]) -> Path:
+        """The map that a file is one with: a disk's pass is its map's."""
+        crossing = f"_disk{match['crossing']}_"
+        return self.folder / match.string.replace(crossing, "_", 1 if match["crossing"] else 0)
 
     def superseded(self, path: Path, parameters: "physics.WarpMapParameters") -> tuple[Path, ...]:
         """Files of the same frame, size and kind beside a map that are not its own."""
@@ -169,7 +185,8 @@ def examine(
     wanted = list(frames)
     scene = scene_named(scene_name)
     names = FolderNames(scene, shot.active_hole(scene).name)
-    listing = Listing(names.folder, leftovers=[names.folder / each for each in names.leftovers])
+    claims = claim.Claims()
+    listing = Listing(names.folder, leftovers=[path for path, owner in names.leftovers if not claims.is_taken(owner)])
     for index, frame in enumerate(wanted):
         yield baking.Progress(frame, index / len(wanted), f"Frame {frame} ({index + 1} of {len(wanted)})")
         with baking.naming(frame, len(wanted)):
@@ -177,7 +194,9 @@ def examine(
         found = maps.check(path, parameters, thorough=thorough)
         size = sum(_size(each) for each in (path, *maps.pass_paths(path, parameters)))
         superseded = names.superseded(path, parameters)
-        listing.frames.append(FrameState(frame, path, found.state, found.fault, size, superseded))
+        taken = found.state is not State.VALID and claims.is_taken(path)
+        baker = claims.holder(path) if taken else None
+        listing.frames.append(FrameState(frame, path, found.state, found.fault, size, superseded, baker))
     return listing
 
 
@@ -205,24 +224,40 @@ def clean(
     physics.BlackHoleError
         As `examine` does; or a file cannot be removed.
     """
-    cleaning = Cleaning(dry_run)
     scene = scene_named(scene_name)
+    names = FolderNames(scene, shot.active_hole(scene).name)
+    doomed: list[tuple[Path, Path, str]] = []
     if everything:
-        names = FolderNames(scene, shot.active_hole(scene).name)
         yield baking.Progress(scene.frame_current, 0.0, "Cleaning")
-        for each in names.maps:
-            _remove(cleaning, names.folder / each, "every map was to be removed")
-        leftovers = [names.folder / each for each in names.leftovers]
+        doomed += [(names.folder / each, owner, "every map was to be removed") for each, owner in names.maps]
     else:
         listing = yield from examine(scene_name, frames, view_layer_name)
         for each in listing.frames:
             if each.state in FAULTY:
-                _remove(cleaning, each.path, each.fault)
-            for path in each.superseded:
-                _remove(cleaning, path, f"{path} is out of date")
-        leftovers = listing.leftovers
-    for path in leftovers:
-        _remove(cleaning, path, f"{path} was left half written")
+                doomed.append((each.path, each.path, each.fault))
+            doomed += [(path, each.path, f"{path} is out of date") for path in each.superseded]
+    doomed += [(path, owner, f"{path} was left by a process that was killed") for path, owner in names.leftovers]
+    return _remove(doomed, dry_run)
+
+
+def _remove(doomed: list[tuple[Path, Path, str]], dry_run: bool) -> Cleaning:
+    """Remove files, unless the map that each belongs to is being baked; paths, maps and reasons."""
+    cleaning = Cleaning(dry_run)
+    with claim.Claims() as claims:
+        for path, owner, reason in doomed:
+            if not path.is_file():
+                continue
+            removal = Removal(path, reason, _size(path))
+            try:
+                if claims.is_taken(owner, watch=False) if dry_run else not claims.take(owner, watch=False):
+                    cleaning.in_use.append(path)
+                    continue
+                if not dry_run:
+                    path.unlink(missing_ok=True)
+                    claims.release(owner)
+            except OSError as error:
+                raise maps.explain(error, path.parent) from error
+            cleaning.removed.append(removal)
     return cleaning
 
 
@@ -247,14 +282,3 @@ def _size(path: Path) -> int:
     except OSError:
         return 0
 
-
-def _remove(cleaning: Cleaning, path: Path, reason: str) -> None:
-    if not path.is_file():
-        return
-    size = _size(path)
-    if not cleaning.dry_run:
-        try:
-            path.unlink(missing_ok=True)
-        except OSError as error:
-            raise maps.explain(error, path.parent) from error
-    cleaning.removed.append(Removal(path, reason, size))

@@ -23,6 +23,9 @@ DONE, FAILED, WRONG_USAGE = 0, 1, 2
 
 _handle: object = None
 
+# Set by a signal that asks the process to end.
+_stop_asked = False
+
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command; return the exit status: 0 done, 1 failed or not all well, 2 wrong usage.
@@ -111,8 +114,9 @@ def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[in
     steps = cache.examine(scene.name, frames, options.view_layer, thorough=not options.quick)
     listing = _drain(steps, _tenths(out, "checking"))
     for each in listing.frames:
-        fault = f"  {each.fault}" if each.state in cache.FAULTY else ""
-        out.line(f"{each.frame:7d}  {each.state:<8}{each.size / 1e6:9.1f} MB{fault}")
+        note = f"  {each.fault}" if each.state in cache.FAULTY else ""
+        note += f"  {each.baker} is baking it" if each.baker else ""
+        out.line(f"{each.frame:7d}  {each.state:<8}{each.size / 1e6:9.1f} MB{note}")
         out.event(
             "frame",
             frame=each.frame,
@@ -120,6 +124,7 @@ def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[in
             bytes=each.size,
             path=str(each.path),
             fault=each.fault or None,
+            baker=each.baker,
         )
     out.line(listing.sentence())
     return DONE if listing.complete else FAILED, {
@@ -142,7 +147,8 @@ def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int
         "command": "clean",
         "dry_run": options.dry_run,
         "files": len(cleaning.removed),
-        "bytes": sum(each.size for each in cleaning.removed),
+        "bytes": cleaning.size,
+        "in_use": [str(each) for each in cleaning.in_use],
         "folder": str(maps.folder(scene).path),
     }
 
@@ -154,6 +160,8 @@ def _drain(steps: Generator[baking.Progress, None, object], tell: object) -> obj
                 progress = next(steps)
             except StopIteration as end:
                 return end.value
+            if _stop_asked:
+                raise KeyboardInterrupt
             tell(progress)
 
 
@@ -198,17 +206,27 @@ def _json_stream(target: str | None, stack: contextlib.ExitStack) -> TextIO | No
 
 @contextlib.contextmanager
 def _stoppable() -> Iterator[None]:
-    """Let Ctrl-C and a farm's request to end stop the work in an orderly way."""
+    """Let Ctrl-C, and a farm's request to end, stop the work between two steps; the second time it ends at once.
+
+    An exception out of a signal could come at any moment, in the middle of starting a thread as well.
+    """
+    global _stop_asked
+    _stop_asked = False
 
     def stop(_signal: int, _frame: object) -> None:
-        raise KeyboardInterrupt
+        global _stop_asked
+        _stop_asked = True
+        restore()
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+        restore()
 
 
 def _frames(text: str) -> list[int]:

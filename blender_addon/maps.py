@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 
-from ._physics import disk_pass_file, exit_map_file, map_check, map_file, physics, warp_map_file
+from ._physics import disk_pass_file, exit_map_file, exr, map_check, map_file, physics, warp_map_file
 from .errors import MapFolderError, SceneError
 
 SEQUENCE_LENGTH = 1_000_000
@@ -40,6 +40,9 @@ class MapKind:
 
 WARP_MAP = MapKind("warp map", warp_map_file.FORMAT)
 EXIT_MAP = MapKind("exit map", exit_map_file.FORMAT)
+
+# The ending of copies that are being made while a file is saved for the first time.
+_PART = ".part"
 
 # What stands between an exit map's frame and the beginning of its hash.
 _EXIT_MARK = "_exit_"
@@ -210,6 +213,22 @@ def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:
         )
 
 
+def half_files(directory: Path) -> dict[str, list[Path]]:
+    """Files that are being written, or were when their process was killed, by the name that they were to have."""
+    found: dict[str, list[Path]] = {}
+    try:
+        names = sorted(os.listdir(directory))
+    except OSError:
+        return found
+    for name in names:
+        target = exr.target_of(name)
+        if target is None and name.startswith(".") and name.endswith(_PART):
+            target = name.removeprefix(".").removesuffix(_PART)
+        if target is not None:
+            found.setdefault(target, []).append(directory / name)
+    return found
+
+
 def explain(error: OSError, place: Path) -> MapFolderError:
     """The sentence for a failure of the file system."""
     if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
@@ -264,7 +283,7 @@ def adopt(scene: bpy.types.Scene, blend_file: Path) -> str | None:
             destination = target / path.name
             if not destination.exists():
                 target.mkdir(parents=True, exist_ok=True)
-                partial = destination.with_name(f".{destination.name}.part")
+                partial = destination.with_name(f".{destination.name}{_PART}")
                 shutil.copyfile(path, partial)
                 os.replace(partial, destination)
     except OSError as error:
