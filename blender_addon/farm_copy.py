@@ -7,15 +7,17 @@ traces its rays itself (as with Rays: No Bake), because the name of an exit map 
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 
 import bpy
 
 from . import foreground, lens_camera, lens_shader, lens_sync, maps, shot
+from ._physics import physics
 from .errors import SceneError
-from .operators import reporting
+from .operators import TIMER_INTERVAL, reporting
 from .properties import IN_SHADER
 
 SUFFIX = "_farm"
@@ -31,11 +33,14 @@ _ADDON = "umbra."  # the paths of this add-on's settings begin so
 
 def path_beside(blend: Path) -> Path:
     """Where the copy of a file lies: beside it, so that relative paths hold."""
-    return blend.with_name(f"{blend.stem.removesuffix(SUFFIX)}{SUFFIX}.blend")
+    return blend.with_name(f"{blend.stem}{SUFFIX}.blend")
 
 
-def save(scene: bpy.types.Scene, frames: range) -> Path:
+def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
     """Write the copy for some frames; the open file stays as it is.
+
+    A generator that yields the share of the work that is done, with the scene at some frame, and returns where the copy
+    is. Nothing else may change the file meanwhile. Closing it cancels the work.
 
     Raises
     ------
@@ -46,10 +51,10 @@ def save(scene: bpy.types.Scene, frames: range) -> Path:
         raise SceneError("This file is not saved yet: save it, then save its farm copy.")
     shot.active_hole(scene)
     path = path_beside(Path(bpy.data.filepath))
-    if path == Path(bpy.data.filepath):
+    if FRAMES in scene:
         raise SceneError("This file is a farm copy already: open the file that it was made from.")
     drivers = list(_drivers_of_settings())
-    tracks, lenses = _read(scene, frames, drivers)
+    tracks, lenses = yield from _read(scene, frames, drivers)
     with _written(scene, frames, tracks, lenses, drivers):
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
@@ -58,19 +63,27 @@ def save(scene: bpy.types.Scene, frames: range) -> Path:
     return path
 
 
+def needs_copy(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's frames would be wrong without the add-on, but for those of such a copy."""
+    if FRAMES in scene:
+        return False
+    return any(map(lens_camera.is_lens, lens_camera.cameras_of(scene))) or any(True for _each in _drivers_of_settings())
+
+
 # --- reading --------------------------------------------------------------------------------------
 
 
 def _read(
     scene: bpy.types.Scene, frames: range, drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]]
-) -> tuple[Tracks, dict[bpy.types.Camera, dict[str, object]]]:
+) -> Generator[float, None, tuple[Tracks, dict[bpy.types.Camera, dict[str, object]]]]:
     """All values by frame, and the parameters of each camera with a lens at the first of its frames."""
     tracks: Tracks = defaultdict(dict)
     lenses: dict[bpy.types.Camera, dict[str, object]] = {}
     layer = next((each for each in scene.view_layers if each.use), scene.view_layers[0])
     current = scene.frame_current
     try:
-        for frame in frames:
+        for done, frame in enumerate(frames if drivers or lens_sync.is_on(scene) else ()):
+            yield done / len(frames)
             scene.frame_set(frame)
             for owner, curve in drivers:
                 tracks[owner, curve.data_path, curve.array_index][frame] = _source_value(owner, curve)
@@ -208,6 +221,9 @@ class _Curve:
             self.owner.animation_data_clear()
 
 
+# --- the operator --------------------------------------------------------------------------------
+
+
 class UMBRA_OT_save_farm_copy(bpy.types.Operator):
     bl_idname = "umbra.save_farm_copy"
     bl_label = "Save Farm Copy"
@@ -217,18 +233,73 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
     )
     bl_options = {"REGISTER"}
 
+    _steps: Generator[float, None, Path] | None = None
+    _timer: bpy.types.Timer | None = None
+
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = save(context.scene, maps.frames_of(context.scene))
-        self.report({"INFO"}, f"Wrote {path.name}.")
+        scene = context.scene
+        steps = save(scene, maps.frames_of(scene))
+        while self._go_on(steps) is None:
+            pass
         return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        manager = context.window_manager
+        self._steps = save(context.scene, maps.frames_of(context.scene))
+        manager.progress_begin(0.0, 1.0)
+        self._timer = manager.event_timer_add(TIMER_INTERVAL, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Take steps for a moment; other events than Esc are swallowed, so that the file stays as it is."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self.report({"INFO"}, "The farm copy was not written.")
+            return self._end(context, {"CANCELLED"})
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        until = perf_counter() + TIMER_INTERVAL
+        while perf_counter() < until:
+            try:
+                result = self._go_on(self._steps, context)
+            except physics.BlackHoleError as error:
+                self.report({"ERROR"}, str(error))
+                return self._end(context, {"CANCELLED"})
+            except Exception:
+                self._end(context, {"CANCELLED"})
+                raise
+            if result is not None:
+                return self._end(context, {"FINISHED"})
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._end(context, {"CANCELLED"})
+
+    def _go_on(self, steps: Generator[float, None, Path], context: bpy.types.Context | None = None) -> Path | None:
+        """Take a step, and say how far it is; the copy's path when it is done."""
+        try:
+            share = next(steps)
+        except StopIteration as end:
+            self.report({"INFO"}, f"Wrote {end.value.name}.")
+            return end.value
+        if context is not None:
+            context.window_manager.progress_update(share)
+            context.workspace.status_text_set(f"Saving the farm copy: {share:.0%} done.  Esc stops.")
+        return None
+
+    def _end(self, context: bpy.types.Context, result: set[str]) -> set[str]:
+        if self._steps is not None:
+            self._steps.close()
+            self._steps = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+        return result
 
 
 CLASSES = (UMBRA_OT_save_farm_copy,)
-
-
-def needs_copy(scene: bpy.types.Scene) -> bool:
-    """Whether the scene's frames would be wrong without the add-on, but for those of such a copy."""
-    if FRAMES in scene:
-        return False
-    return any(map(lens_camera.is_lens, lens_camera.cameras_of(scene))) or any(True for _each in _drivers_of_settings())

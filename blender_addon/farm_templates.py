@@ -106,9 +106,9 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         written = save(scene, Path(bpy.path.abspath(self.directory)))
-        if farm_copy.needs_copy(scene):
-            written.append(farm_copy.save(scene, maps.frames_of(scene)))
         self.report({"INFO"}, f"Wrote {', '.join(path.name for path in written)}.")
+        if farm_copy.needs_copy(scene):
+            bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
         return {"FINISHED"}
 
 

@@ -180,6 +180,8 @@ def test_the_open_file_stays_as_it_is(
     np.testing.assert_array_equal(render_all(scene, tmp_path, exr), before)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot_farm.blend"))
     np.testing.assert_array_equal(render_all(bpy.context.scene, tmp_path, exr), before)
+    with pytest.raises(RuntimeError, match="a farm copy already: open the file that it was made from"):
+        bpy.ops.umbra.save_farm_copy()
 
 
 def test_what_cannot_be_copied_is_said(scene: bpy.types.Scene, tmp_path: Path) -> None:
