@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Claims: which process is making which file, so that several, on one machine or many, can fill a folder together.
 
-A claim is a small file beside the one that it is for, made in one step that fails if it is there already (O_CREAT with
-O_EXCL), which network file systems keep to as well; no locks are relied upon. It says who holds it, and its time is
-renewed as a sign of life. Whoever claims a file looks first whether that has been made in the meantime, and files are
-replaced whole, so that the worst that a mistaken claim can do is work done twice.
+A claim is a small file beside the one that it is for, made in one step that fails if it is there already (a link, or
+O_CREAT with O_EXCL), which network file systems keep to as well; no locks are relied upon. It says who holds it, and
+its time is renewed as a sign of life. Whoever claims a file looks first whether that has been made in the meantime, and
+files are replaced whole, so that the worst that a mistaken claim can do is work done twice.
 
 A claim is dead if its process is gone, as far as that can be seen on the same machine; or if it has shown no sign of
 life for `STALE_AFTER`, by the file system's clock (that of a file made there now) or by the watch of the observer.
@@ -163,16 +163,12 @@ class Claims:
         while True:
             path = claim_path(target, generation)
             try:
-                handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+                _make(path, Holder.this().to_bytes())
             except FileExistsError:
                 if not self._is_dead(path, watch):
                     return False
                 generation += 1
                 continue
-            try:
-                os.write(handle, Holder.this().to_bytes())
-            finally:
-                os.close(handle)
             break
         later = claim_path(target, generation + 1)
         if later.exists() and not self._is_dead(later, watch):
@@ -244,7 +240,7 @@ class Claims:
         if sighting is None or sighting.signature != (changed, content):
             sighting = self._sightings[path] = _Sighting((changed, content), now)
         quiet = now - sighting.since
-        if quiet >= STALE_AFTER:
+        if quiet >= (STALE_AFTER if holder is not None else LEAST_WATCH):
             return True
         if watch and quiet < LEAST_WATCH:
             return False
@@ -257,6 +253,33 @@ class Claims:
         """Give all claims back."""
         for target in list(self._held):
             self.release(target)
+
+
+def _make(path: Path, content: bytes) -> None:
+    """Make a claim with its content in one step.
+
+    Raises
+    ------
+    FileExistsError
+        When it is there already.
+    """
+    target = path.with_name(str(claimed_name(path.name)))
+    handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=path.parent)
+    draft = Path(name)
+    try:
+        os.write(handle, content)
+        os.close(handle)
+        try:
+            os.link(draft, path)
+        except FileExistsError:
+            if draft.stat().st_nlink != 2:  # the server did it, and its answer was lost
+                raise
+        except OSError:  # a file system without links: two steps, and whoever comes between finds no name yet
+            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+            os.write(handle, content)
+            os.close(handle)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def _file_system_time(folder: Path) -> int:

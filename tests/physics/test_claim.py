@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Claims: who may make a file, with real processes that live, die and fall silent."""
 
+import errno
 import json
 import os
 import subprocess
@@ -162,6 +163,33 @@ def test_a_claim_that_is_just_being_written(target: Path) -> None:
     with Claims() as mine:
         assert not mine.take(target)
         assert mine.holder(target) == "another process"
+
+
+def test_a_claim_that_was_never_written(target: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its process was killed between the two steps that a file system without links takes."""
+    now = 1000.0
+    monkeypatch.setattr(claim.time, "monotonic", lambda: now)
+    claim_path(target).write_bytes(b"")
+    with Claims() as mine:
+        assert not mine.take(target)
+        now += claim.LEAST_WATCH
+        assert mine.take(target)
+
+
+def test_a_file_system_without_links(
+    target: Path, other: subprocess.Popen[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EOPNOTSUPP, "not supported")
+
+    monkeypatch.setattr(claim.os, "link", refuse)
+    with Claims() as mine:
+        assert not mine.take(target)
+        other.kill()
+        other.wait()
+        assert mine.take(target)
+        assert str(os.getpid()) in mine.holder(target)
+    assert not list(target.parent.iterdir())
 
 
 def test_a_claim_that_somebody_removed_does_not_disturb_its_holder(
