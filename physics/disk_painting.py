@@ -25,6 +25,7 @@ from .orbiting_matter import circular_redshift, redshift_factor
 from .painting import wrapped
 from .radial_path import winding
 from .rays import Array
+from .ring_table import Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
 from .tiles import (
     TAIL,
@@ -37,7 +38,7 @@ from .tiles import (
     sides_for,
     tiles_of,
 )
-from .tracer import BLOCK_SIZE, Fate
+from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
 from .view import View
 
 Mask = NDArray[np.bool_]
@@ -54,6 +55,16 @@ PIXEL_ERROR = 0.03
 
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
+
+# The side of the tiles from which on tables serve the later images, if their tiles would ask for this many rays, each
+# of them in so many rounds.
+TABLE_SIDE = 32
+WORTHWHILE_RAYS = 12_000
+TABLE_ROUNDS = 3
+# A table is made of this share of them.
+TABLE_SHARE = 0.35
+# Outside of this radius there are no rays of negative energy, at any latitude.
+ERGOSPHERE = 2.0
 
 # Chebyshev coefficients looked up at a time for single pixels at a rim.
 GROUP_VALUES = 1 << 20
@@ -102,6 +113,7 @@ class DiskPainting:
         self._far = np.zeros((self._disk.crossings, self._height, self._width), dtype=bool)
         self._unresolved = np.zeros((self._height, self._width), dtype=bool)
         self._rays = 0
+        self._tables: dict[int, RingTable] = {}
 
     def counts(self) -> dict[str, int]:
         """Number of rays that were traced for the passes, and of pixels whose ray was given up."""
@@ -131,6 +143,34 @@ class DiskPainting:
 
         u is finite everywhere: rays that never cross count as far beyond their end.
         """
+        if not self._tables:
+            return self._trace_rays(x, y, wanted)
+        values, lost = np.full((self._disk.crossings, self._channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
+        asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
+        rays, light = self._view.rays(x[asked], y[asked]), self._view.light(x[asked], y[asked])
+        left = wanted.copy()
+        for order, table in self._tables.items():
+            here = np.flatnonzero(wanted[order, asked])
+            place = table.places(light[:, here], 3 if self._falls else 2)
+            known = np.isfinite(place[0])
+            here, place = here[known], place[:, known]
+            left[order, asked[here]] = False
+            one_plus_z = rays.one_plus_z[here]
+            found = [self._clipped(place[0]), place[1], one_plus_z, rays.b[here] * one_plus_z]
+            if self._falls:
+                found.append(place[2] * one_plus_z)
+            values[order, :, asked[here]] = np.stack(found, axis=1)
+        traced = np.flatnonzero(left.any(axis=0))
+        part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
+        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
+        return values, lost
+
+    def _clipped(self, u: Array) -> Array:
+        clipped: Array = np.clip(u, LOWEST_U / self._outer, HIGHEST_U / self._inner)
+        return clipped
+
+    def _trace_rays(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
+        """Do what `_sample` does, a ray for each place."""
         values = np.empty((self._disk.crossings, self._channels, len(x)))
         lost = np.zeros(len(x), dtype=bool)
         for start in range(0, len(x), BLOCK_SIZE):
@@ -145,7 +185,7 @@ class DiskPainting:
             )
             low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
             nowhere = np.where(found.fate == Fate.SHADOW, high, low)
-            u = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
+            u = self._clipped(np.where(np.isnan(found.u), nowhere, found.u))
             values[:, U, block] = np.where(wanted[:, block], u, np.nan)
             values[:, PHI, block] = np.nan_to_num(found.unwound)
             values[:, ENERGY, block] = light.energy / light.camera_energy
@@ -166,6 +206,8 @@ class DiskPainting:
         done, share = 0.0, 0.6 / len(sides)
         for side in sides:
             marked = self._marked(waiting, marked_x, marked_y)
+            if side == TABLE_SIDE:
+                self._make_tables(wanted)
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
@@ -180,6 +222,25 @@ class DiskPainting:
                 inside = (waiting.column < self._width) & (waiting.row < self._height)
                 waiting, wanted = waiting.select(inside), wanted[inside]
         yield from self._trace(waiting, wanted, done)
+
+    def _make_tables(self, wanted: Mask) -> None:
+        """Make tables of the later images that still ask for many rays; `wanted`: by tile and crossing."""
+        rays = np.count_nonzero(wanted, axis=0) * (TABLE_ROUNDS * DISK_POINTS**2)
+        orders = {k: TABLE_SHARE * rays[k] for k in range(1, self._disk.crossings) if rays[k] > WORTHWHILE_RAYS}
+        observer = self._parameters.observer()
+        stepping = self._parameters.method != DEFAULT_METHOD
+        if not orders or stepping or observer.r < ERGOSPHERE:
+            return
+        needs = Needs(
+            self._inner,
+            self._outer,
+            self._tolerance,
+            self._parameters.pixel_angle,
+            PIXEL_ERROR,
+            PLACE_ERROR * self._parameters.interpolation,
+        )
+        self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
+        self._rays += sum(table.rays for table in self._tables.values())
 
     def _marked_places(self) -> tuple[Array, Array]:
         """Return pixel coordinates of the hole's centre and, if it is slim, on the disk as flat space would show it.
@@ -248,7 +309,7 @@ class DiskPainting:
         # Single precision is what is written, and enough for sums of terms of order 1.
         base = at_pixels(tiles.side, DISK_POINTS)[0].astype(np.float32)
         single = coefficients.astype(np.float32)
-        values: Image = base @ single @ base.T
+        values: NDArray[Any] = base @ single @ base.T
         u = values[:, U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is a small part of a tile's.
@@ -260,7 +321,9 @@ class DiskPainting:
         if len(rim):
             self._fill_rim(order, tiles.select(rim), single[rim], values[rim])
 
-    def _fill_rim(self, order: int, tiles: Tiles, coefficients: Image, values: Image) -> None:
+    def _fill_rim(
+        self, order: int, tiles: Tiles, coefficients: NDArray[Any], values: NDArray[Any]
+    ) -> None:
         """Write tiles with a rim in them from Chebyshev coefficients and the channels, (n, channels, side, side)."""
         u = values[:, U]
         off = np.maximum(1.0 / self._outer - u, u - 1.0 / self._inner)
@@ -271,42 +334,45 @@ class DiskPainting:
         steps[:, :, 0], steps[:, 0] = steps[:, :, 1], steps[:, 1]
         near = np.abs(off) < steps
         covered = (off < 0.0) & ~near
+        partial = self._partly_covered(tiles, coefficients[:, U], near, covered)
         values[:, U] = np.clip(u, 1.0 / self._outer, 1.0 / self._inner)
         self._write_tiles(order, tiles, values, covered)
+        (tile, row, column), share, met, (x, y) = partial
+        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
+        along, upright = base[column] + slope[column] * x[:, None], base[row] + slope[row] * y[:, None]
+        here = np.einsum("ncj,nj->cn", np.einsum("ni,ncij->ncj", upright, coefficients[tile]), along)
+        here[U] = met
+        place = (tiles.column[tile] + column, tiles.row[tile] + row)
+        self._write(order, place, self._matter(here), share)
+
+    def _partly_covered(
+        self, tiles: Tiles, coefficients: NDArray[Any], near: Mask, covered: Mask
+    ) -> tuple[tuple[NDArray[np.intp], ...], Array, Array, tuple[Array, Array]]:
+        """Return tile, row and column of pixels at a rim, their coverage, u within the annulus, and where in the pixel
+        that is met; mark those that are `covered` wholly. `coefficients`: of u, (n, DISK_POINTS, DISK_POINTS)."""
         tile, row, column = np.nonzero(near)
         inside = (tiles.column[tile] + column < self._width) & (tiles.row[tile] + row < self._height)
+        tile, row, column = tile[inside], row[inside], column[inside]
+        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
         group = max(1, GROUP_VALUES // DISK_POINTS**2)
+        found = np.empty((3, len(tile)))
         for start in range(0, len(tile), group):
             part = slice(start, start + group)
-            self._fill_near_rim(order, tiles, coefficients, *(each[inside][part] for each in (tile, row, column)))
+            own = coefficients[tile[part]]
+            across = np.einsum("nij,nj->ni", own, base[column[part]])
+            found[0, part] = np.einsum("ni,ni->n", base[row[part]], across)
+            found[2, part] = np.einsum("ni,ni->n", slope[row[part]], across)
+            across = np.einsum("nij,nj->ni", own, slope[column[part]])
+            found[1, part] = np.einsum("ni,ni->n", base[row[part]], across)
+        share = coverage(found[0], found[1], found[2], self._inner, self._outer)
+        whole = share == 1.0
+        covered[tile[whole], row[whole], column[whole]] = True
+        left = np.flatnonzero((share > 0.0) & ~whole)
+        met = found[:, left]
+        u, x, y = nearest_covered(met[0], met[1], met[2], self._inner, self._outer)
+        return (tile[left], row[left], column[left]), share[left], u, (x, y)
 
-    def _fill_near_rim(
-        self,
-        order: int,
-        tiles: Tiles,
-        coefficients: Image,
-        tile: NDArray[np.intp],
-        row: NDArray[np.intp],
-        column: NDArray[np.intp],
-    ) -> None:
-        """Write single pixels, which a rim may touch, of tiles given by Chebyshev coefficients."""
-        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
-
-        def at(upright: Image, along: Image) -> Image:
-            found: Image = np.einsum("ncj,nj->cn", np.einsum("ni,ncij->ncj", upright, coefficients[tile]), along)
-            return found
-
-        here = np.stack([at(base[row], base[column]), at(base[row], slope[column]), at(slope[row], base[column])])
-        u, across, down = here[:, U]
-        share = coverage(u, across, down, self._inner, self._outer)
-        u, x, y = nearest_covered(u, across, down, self._inner, self._outer)
-        met = here[0] + here[1] * x + here[2] * y
-        met[U] = u
-        seen = share > 0.0
-        place = (tiles.column[tile[seen]] + column[seen], tiles.row[tile[seen]] + row[seen])
-        self._write(order, place, self._matter(met[:, seen]), share[seen])
-
-    def _write_tiles(self, order: int, tiles: Tiles, values: Image, covered: Mask | None) -> None:
+    def _write_tiles(self, order: int, tiles: Tiles, values: NDArray[Any], covered: Mask | None) -> None:
         """Write tiles from channels of shape (n, channels, side, side), where they are wholly covered: None for all."""
         radius, phi, g = self._matter(np.moveaxis(values, 1, 0))
         share = np.ones_like(radius) if covered is None else covered.astype(radius.dtype)
@@ -380,7 +446,7 @@ class DiskPainting:
                 seen = np.nonzero((share > 0.0) & ~finer & inside[chosen])
             u, x, y = nearest_covered(here[U][seen], across[seen], down[seen], self._inner, self._outer)
             right, below = _slopes(here, seen)
-            moved = here[(slice(None), *seen)] + right * x + below * y
+            moved = here[:, seen[0], seen[1], seen[2]] + right * x + below * y
             moved[U] = u
             place = (columns[chosen][seen], rows[chosen][seen])
             self._write(order, place, self._matter(moved), share[seen])
