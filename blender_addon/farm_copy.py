@@ -14,7 +14,7 @@ from time import perf_counter
 
 import bpy
 
-from . import foreground, lens_camera, lens_shader, lens_sync, maps, shot
+from . import disk_light, foreground, lens_camera, lens_shader, lens_sync, maps, shot
 from ._physics import physics
 from .errors import SceneError
 from .operators import TIMER_INTERVAL, reporting
@@ -49,7 +49,12 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
     """
     if not bpy.data.filepath:
         raise SceneError("This file is not saved yet: save it, then save its farm copy.")
-    shot.active_hole(scene)
+    hole = shot.active_hole(scene)
+    if disk_light.find(hole) is not None and _has_animated_settings(hole):
+        raise SceneError(
+            f'The disk of "{hole.name}" lights the scene, and its settings are animated, which a mesh cannot follow '
+            "without the add-on: switch Light the Scene off, or render with the add-on."
+        )
     path = path_beside(Path(bpy.data.filepath))
     if FRAMES in scene:
         raise SceneError("This file is a farm copy already: open the file that it was made from.")
@@ -128,6 +133,19 @@ def _drivers_of_settings() -> Iterator[tuple[bpy.types.ID, bpy.types.FCurve]]:
                     targets = [target for each in curve.driver.variables for target in each.targets]
                     if any(target.data_path.startswith(_ADDON) for target in targets):
                         yield owner, curve
+
+
+def _has_animated_settings(hole: bpy.types.Object) -> bool:
+    animation = hole.animation_data
+    if animation is None:
+        return False
+    bags = [] if animation.action is None else _channelbags(animation.action)
+    curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
+    return any(curve.data_path.startswith(_ADDON) for curve in curves)
+
+
+def _channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
+    return [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
 
 
 def _source_value(owner: bpy.types.ID, curve: bpy.types.FCurve) -> float:
@@ -209,11 +227,9 @@ class _Curve:
         """Take the curve out, and with it the action that was made for it."""
         animation = self.owner.animation_data
         if self.new_action is None:
-            for layer in animation.action.layers:
-                for strip in layer.strips:
-                    for bag in strip.channelbags:
-                        if self.curve in bag.fcurves.values():
-                            bag.fcurves.remove(self.curve)
+            for bag in _channelbags(animation.action):
+                if self.curve in bag.fcurves.values():
+                    bag.fcurves.remove(self.curve)
             return
         animation.action = None
         bpy.data.actions.remove(self.new_action)

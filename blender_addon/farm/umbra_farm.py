@@ -24,7 +24,9 @@ import bpy
 
 # As the add-on marks its nodes and numbers its files.
 ROLE = "umbra_role"
+SETTINGS = "umbra."
 LENS = "umbra_lens_before"
+LIGHT = "umbra_disk_light"
 COPIED_FRAMES = "umbra_farm_frames"
 READ_BY_FRAME = re.compile(r"map|disk_pass_\d+")
 SEQUENCE_LENGTH = 1_000_000
@@ -119,8 +121,25 @@ def is_used(node: bpy.types.Node) -> bool:
     return any(not each.mute and (each.get(ROLE) != "disk" or is_used(each)) for each in readers)
 
 
+def check_light(scene: bpy.types.Scene) -> None:
+    """Refuse a disk that lights the scene while its settings are animated: only the add-on makes its mesh follow."""
+    for each in scene.objects:
+        animation = each.parent.animation_data if LIGHT in each and each.parent is not None else None
+        if animation is None:
+            continue
+        layers = [] if animation.action is None else animation.action.layers
+        bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
+        curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
+        if any(curve.data_path.startswith(SETTINGS) for curve in curves):
+            raise Fault(
+                f'The disk of "{each.parent.name}" lights the scene, and its settings are animated: render with the '
+                "add-on, or switch Light the Scene off."
+            )
+
+
 def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
     """Refuse frames that only the add-on, or its farm copy of the file, renders right."""
+    check_light(scene)
     known = scene.get(COPIED_FRAMES)
     if known is not None:
         outside = [frame for frame in frames if not known[0] <= frame <= known[1]]
@@ -140,7 +159,7 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
         for variable in curve.driver.variables
         for target in variable.targets
     ]
-    if lensed or any(target.data_path.startswith("umbra.") for target in targets):
+    if lensed or any(target.data_path.startswith(SETTINGS) for target in targets):
         raise Fault(
             "This file needs the add-on in each frame (for the Cycles Lens, or a disk whose settings are animated): "
             "render its farm copy, which Save Farm Copy in the Umbra panel writes."

@@ -197,6 +197,18 @@ def test_what_cannot_be_copied_is_said(scene: bpy.types.Scene, tmp_path: Path) -
         bpy.ops.umbra.save_farm_copy()
 
 
+def test_a_light_that_cannot_follow_is_refused(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    """Its mesh is made anew for each frame by the add-on alone."""
+    animate_exposure(scene)
+    scene.umbra.active_hole.umbra.disk.light = True
+    blend = save(tmp_path)
+    with pytest.raises(RuntimeError, match="lights the scene, and its settings are animated"):
+        bpy.ops.umbra.save_farm_copy()
+    refused = run_without_addon((blend, "check"))
+    assert statuses(refused) == [1], refused.stderr
+    assert "lights the scene, and its settings are animated: render with the add-on" in refused.stdout
+
+
 @pytest.mark.parametrize("harm", ["missing", "damaged"])
 def test_a_map_that_is_not_there_is_no_magenta_success(scene: bpy.types.Scene, tmp_path: Path, harm: str) -> None:
     blend = save(tmp_path)
