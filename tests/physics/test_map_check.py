@@ -18,7 +18,10 @@ from physics.map_file import ATTRIBUTE_FORMAT
 from physics.warp_map_file import FORMAT as WARP_MAP
 
 PARAMETERS = WarpMapParameters(
-    spin=0.9, camera=PerspectiveCamera(32, 18, focal_length=30.0), camera_position=(20.0, 0.0, 3.0), disk=Disk(crossings=1)
+    spin=0.9,
+    camera=PerspectiveCamera(32, 18, focal_length=30.0),
+    camera_position=(20.0, 0.0, 3.0),
+    disk=Disk(crossings=1),
 )
 
 
