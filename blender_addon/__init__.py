@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import bpy
 
-from . import command, disk_panel, farm_copy, farm_templates, handlers, operators, panels, properties
+from . import cache_panel, command, disk_panel, farm_copy, farm_templates, handlers, operators, panels, properties
 
 _CLASSES = (
     *properties.CLASSES,
     *operators.CLASSES,
     *panels.CLASSES,
     *disk_panel.CLASSES,
+    *cache_panel.CLASSES,
     *farm_copy.CLASSES,
     *farm_templates.CLASSES,
 )

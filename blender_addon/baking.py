@@ -361,8 +361,10 @@ def finish(scene_name: str) -> None:
         sync.forget_loaded_map(scene)
 
 
-def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) -> Summary:
-    """Run a bake to its end; with `announce`, each tenth of the work is printed."""
+def drain(
+    steps: Generator[Progress, None, Summary], *, announce: bool = False, doing: str = "Baking warp maps"
+) -> Summary:
+    """Run a bake, or the like, to its end; with `announce`, each tenth of the work is printed."""
     told = -1
     while True:
         try:
@@ -372,4 +374,4 @@ def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) 
         tenth = int(progress.fraction * 10)
         if announce and tenth != told:
             told = tenth
-            print(f"Umbra: baking warp maps {progress.fraction:4.0%}  {progress.text}", flush=True)
+            print(f"Umbra: {doing[0].lower()}{doing[1:]} {progress.fraction:4.0%}  {progress.text}", flush=True)

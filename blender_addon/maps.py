@@ -64,7 +64,8 @@ def folder(scene: bpy.types.Scene) -> MapFolder:
     if chosen.startswith("//") and not bpy.data.filepath:
         path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
         return MapFolder(str(path) + os.sep, path, True)
-    return MapFolder(chosen, Path(bpy.path.abspath(chosen)), False)
+    # what a linked scene calls beside the file is beside its own file
+    return MapFolder(chosen, Path(bpy.path.abspath(chosen, library=scene.library)), False)
 
 
 def _chosen_folder(scene: bpy.types.Scene) -> str:

@@ -267,17 +267,16 @@ def _make(path: Path, content: bytes) -> None:
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=path.parent)
     draft = Path(name)
     try:
-        os.write(handle, content)
-        os.close(handle)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
         try:
             os.link(draft, path)
         except FileExistsError:
             if draft.stat().st_nlink != 2:  # the server did it, and its answer was lost
                 raise
         except OSError:  # a file system without links: two steps, and whoever comes between finds no name yet
-            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
-            os.write(handle, content)
-            os.close(handle)
+            with path.open("xb") as stream:
+                stream.write(content)
     finally:
         draft.unlink(missing_ok=True)
 

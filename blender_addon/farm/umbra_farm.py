@@ -149,7 +149,7 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
             )
         return
     cameras = [scene.camera, *(marker.camera for marker in scene.timeline_markers)]
-    lensed = any(each is not None and each.data is not None and LENS in each.data for each in cameras)
+    lensed = any(each is not None and each.type == "CAMERA" and LENS in each.data for each in cameras)
     tree = compositor_of(scene)
     drivers = tree.animation_data.drivers if tree is not None and tree.animation_data is not None else []
     targets = [

@@ -135,7 +135,9 @@ def links_of(tree: bpy.types.NodeTree) -> set[tuple[str, str, str, str]]:
     }
 
 
-def run_python(code: str, *, resources: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run_python(
+    code: str, *, resources: Path | None = None, timeout: float = PROCESS_TIMEOUT
+) -> subprocess.CompletedProcess[str]:
     """Run a script in a process of its own, with the extension that these tests installed.
 
     With a folder for `resources`, Blender keeps to that one instead, in which nothing is installed.
@@ -148,7 +150,7 @@ def run_python(code: str, *, resources: Path | None = None) -> subprocess.Comple
         _script(code, enable=resources is None),
         capture_output=True,
         text=True,
-        timeout=PROCESS_TIMEOUT,
+        timeout=timeout,
         check=False,
         env=environment,
     )
