@@ -22,7 +22,7 @@ import numpy as np
 from .crossings import cross_plane
 from .observer import Observer
 from .rays import Array, rays_from_triad
-from .sky_table import AROUND, AROUND_ERROR, lagrange_weights, position_angles
+from .sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
 from .sphere import cos_sin
 from .trapped import around_hole, edge_angles
 
@@ -102,9 +102,9 @@ class RingTable:
         """How many rays it was made of, but for those that told the scale."""
         return self._angles * (self._columns + 2)
 
-    def places(self, light: Array, channels: int) -> Array:
-        """Return the first few channels for light, shape (3, n) as for `SkyTable.directions`; NaN: no answer."""
-        away, row, part = position_angles(light, self._angles)
+    def places(self, away: Array, angle: Array, channels: int) -> Array:
+        """Return the first few channels at `position_angles`, shape (channels, n); NaN: no answer."""
+        row, part = angle_steps(angle, self._angles)
         across = lagrange_weights(part, AROUND)
         edge, scale, step = (
             sum(weight * each.take(row + i) for i, weight in enumerate(across))

@@ -16,6 +16,7 @@ from physics.polar import PolarMotion
 from physics.radial_path import winding
 from physics.rays import rays_from_triad
 from physics.ring_table import Needs, ring_tables
+from physics.sky_table import position_angles
 from physics.sphere import unit_vectors
 from physics.view import View
 
@@ -60,7 +61,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
     tables = tables_of(parameters)
     assert set(tables) == {1, 2}
     for order, table in tables.items():
-        u, azimuth = table.places(view.light(x, y), 2)
+        u, azimuth = table.places(*position_angles(view.light(x, y)), 2)
         known = np.isfinite(u)
         exact = traced.u[order]
         on_disk = (exact > 1.0 / outer) & (exact < 1.0 / inner)
