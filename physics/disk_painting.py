@@ -27,6 +27,7 @@ from .radial_path import winding
 from .rays import Array
 from .ring_table import Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
+from .sky_table import position_angles
 from .tiles import (
     TAIL,
     TAIL_SHARE,
@@ -58,9 +59,9 @@ EMPTY_MARGIN = 4.0
 
 # The side of the tiles from which on tables serve the later images, if their tiles would ask for this many rays, each
 # of them in so many rounds.
-TABLE_SIDE = 32
+TABLE_SIDE = 64
 WORTHWHILE_RAYS = 12_000
-TABLE_ROUNDS = 3
+TABLE_ROUNDS = 6
 # A table is made of this share of them.
 TABLE_SHARE = 0.35
 # Outside of this radius there are no rays of negative energy, at any latitude.
@@ -147,11 +148,12 @@ class DiskPainting:
             return self._trace_rays(x, y, wanted)
         values, lost = np.full((self._disk.crossings, self._channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
         asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
-        rays, light = self._view.rays(x[asked], y[asked]), self._view.light(x[asked], y[asked])
+        rays = self._view.rays(x[asked], y[asked])
+        away, angle = position_angles(self._view.light(x[asked], y[asked]))
         left = wanted.copy()
         for order, table in self._tables.items():
             here = np.flatnonzero(wanted[order, asked])
-            place = table.places(light[:, here], 3 if self._falls else 2)
+            place = table.places(away[here], angle[here], 3 if self._falls else 2)
             known = np.isfinite(place[0])
             here, place = here[known], place[:, known]
             left[order, asked[here]] = False
