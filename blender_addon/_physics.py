@@ -24,6 +24,8 @@ if importlib.util.find_spec(f"{__package__}.physics") is not None:
         orbiting_matter,
         reference_render,
         star_sky,
+        world_map,
+        world_map_file,
     )
 else:
     import physics  # type: ignore[no-redef]
@@ -41,6 +43,8 @@ else:
         orbiting_matter,
         reference_render,
         star_sky,
+        world_map,
+        world_map_file,
     )
 
 __all__ = [
@@ -58,4 +62,6 @@ __all__ = [
     "physics",
     "reference_render",
     "star_sky",
+    "world_map",
+    "world_map_file",
 ]
