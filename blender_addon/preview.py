@@ -15,10 +15,13 @@ import numpy as np
 
 from . import lens_sync, shot, thumbnail, world_output, world_sync
 from ._physics import physics, world_map
+from .errors import SceneError
 from .properties import ACCURACIES
 
 # Seconds that one slice of work may take, and between two of them.
-BUDGET, PAUSE = 0.03, 0.001
+BUDGET, PAUSE = 0.08, 0.001
+# Seconds after the last change until Cycles is made to look once more.
+SETTLE = 0.3
 
 
 @dataclass
@@ -31,6 +34,7 @@ class _State:
     changed: bool = True
     updates: int = 0
     problem: str = ""
+    settle_at: float | None = None
     since: float = field(default_factory=time.perf_counter)
     """When the change that is not shown yet was noted."""
     latency: float = 0.0
@@ -142,13 +146,13 @@ def _note(scene: bpy.types.Scene) -> None:
 
 def _tick() -> float | None:
     """The timer: one slice of work; again soon while there is more."""
-    return PAUSE if advance(BUDGET) else None
+    return advance(BUDGET)
 
 
-def advance(budget: float) -> bool:
-    """Work for about `budget` seconds; whether there is more to do."""
+def advance(budget: float) -> float | None:
+    """Work for about `budget` seconds; return after how many seconds to go on, None when all is done."""
     if not can_run():
-        return False
+        return None
     end = time.perf_counter() + budget
     for name in list(_states):
         scene = bpy.data.scenes.get(name)
@@ -164,20 +168,26 @@ def advance(budget: float) -> bool:
                 _show_problem(scene)
             if time.perf_counter() >= end:
                 break
-    return any(each.steps is not None or each.changed for each in _states.values())
+        if now.settle_at is not None and time.perf_counter() >= now.settle_at and now.steps is None:
+            now.settle_at = None
+            world_sync.show_again(scene)
+    if any(each.steps is not None or each.changed for each in _states.values()):
+        return PAUSE
+    return SETTLE if any(each.settle_at is not None for each in _states.values()) else None
 
 
 def _step(scene: bpy.types.Scene, now: _State) -> None:
     if now.steps is None:
         now.changed = False
-        frame = shot.read(scene, lens_sync.depsgraph_of(scene), velocity=np.zeros(3))
+        depsgraph = lens_sync.depsgraph_of(scene)
+        frame = shot.read(scene, depsgraph, velocity=np.zeros(3))
         now.problem = ""
-        key = (frame.parameters, scene.umbra.output)
+        camera = _camera_of(scene, depsgraph, frame)
+        key = (frame.parameters, camera, scene.umbra.output, thumbnail.key(scene))
         if key == now.shown:
-            thumbnail.refresh_sky(scene)
             return
         now.shown = key
-        now.steps = _work(scene.name, frame, now)
+        now.steps = _work(scene.name, frame, camera, now)
         return
     try:
         next(now.steps)
@@ -185,7 +195,20 @@ def _step(scene: bpy.types.Scene, now: _State) -> None:
         now.steps = None
 
 
-def _work(name: str, frame: shot.Shot, now: _State) -> Generator[None, None, None]:
+def _camera_of(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Shot
+) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
+    """What the thumbnail is seen by; for a lens that only the World knows, all directions."""
+    data = scene.camera.evaluated_get(depsgraph).data
+    try:
+        return shot.camera_model(data, scene.render, scene.render.engine)
+    except SceneError:
+        return frame.parameters.camera
+
+
+def _work(
+    name: str, frame: shot.Shot, camera: "physics.PerspectiveCamera | physics.PanoramaCamera", now: _State
+) -> Generator[None, None, None]:
     """Make a map and a thumbnail of a shot; the scene is looked up anew after each pause."""
     tolerance, _ = ACCURACIES["DRAFT"]
     draft = replace(frame.parameters, tolerance=tolerance, method=physics.DEFAULT_METHOD, disk=None)
@@ -196,10 +219,11 @@ def _work(name: str, frame: shot.Shot, now: _State) -> Generator[None, None, Non
         if scene is None:
             return
         world_sync.show_live(scene, made)
+        now.settle_at = time.perf_counter() + SETTLE if world_sync.needs_turns(scene) else None
         now.latency = time.perf_counter() - now.since
         _redraw()
         yield
-    picture = yield from _paused(thumbnail.steps(name, draft))
+    picture = yield from _paused(thumbnail.steps(name, replace(draft, camera=camera)))
     if picture is not None:
         thumbnail.show(name, picture)
         now.latency = now.latency or time.perf_counter() - now.since

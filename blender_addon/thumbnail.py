@@ -9,7 +9,7 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from . import environment, shot
+from . import environment, world_output
 from ._physics import physics, reference_render
 from .compositor_tree import find_setup
 
@@ -21,6 +21,14 @@ SKY_ROWS = 256
 # Where the sky cannot be read, squares of 10 degrees in two greys stand for it.
 SQUARES = 18
 GREYS = (0.02, 0.12)
+
+# Arguments of `reference_render.render`, and the groups' sockets that say the same.
+_SOCKETS = {
+    "exposure": "Exposure",
+    "colour_amount": "Redshift Colour",
+    "brightness_amount": "Redshift Brightness",
+    "temperature": "Sky Temperature",
+}
 
 
 @dataclass(frozen=True)
@@ -97,10 +105,7 @@ def steps(scene_name: str, parameters: "physics.WarpMapParameters") -> Generator
     scene = bpy.data.scenes.get(scene_name)
     if scene is None:
         return None
-    rotation, strength, exposure = _placement(scene)
-    picture = reference_render.render(
-        warp_map, _sky_of(scene), rotation=rotation, strength=strength, exposure=exposure
-    ).sky
+    picture = reference_render.render(warp_map, _sky_of(scene), **look(scene)).sky
     picture[..., :3] = _encoded(picture[..., :3])
     return picture[::-1]
 
@@ -111,33 +116,54 @@ def _encoded(values: np.ndarray) -> np.ndarray:
     return np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055)
 
 
-def _placement(scene: bpy.types.Scene) -> tuple[tuple[float, float, float], float, float]:
-    """Rotation, strength and exposure of the sky; as it is where they cannot be read."""
+def look(scene: bpy.types.Scene) -> dict[str, object]:
+    """How the sky is placed and shifted, as `reference_render.render` takes it; as it is where that cannot be read."""
+    settings = scene.umbra
+    values: dict[str, object] = {
+        "colour_amount": settings.redshift_colour,
+        "brightness_amount": settings.redshift_brightness,
+        "temperature": settings.sky_temperature,
+    }
+    setup = find_setup(scene)
+    node = world_output.group_node(world_output.lensed_world(scene)) if setup is None else setup.group
+    if node is not None:
+        values |= {
+            name: node.inputs[socket].default_value for name, socket in _SOCKETS.items() if socket in node.inputs
+        }
     try:
         sky = environment.read(scene)
     except physics.BlackHoleError:
-        return (0.0, 0.0, 0.0), 1.0, 0.0
-    setup = find_setup(scene)
-    socket = None if setup is None else setup.group.inputs.get("Exposure")
-    return sky.rotation, sky.strength, 0.0 if socket is None else socket.default_value
+        return values
+    if setup is not None:
+        rotation = node.inputs["Environment Rotation"].default_value
+        return values | {"rotation": tuple(rotation), "strength": node.inputs["Environment Strength"].default_value}
+    return values | {"rotation": tuple(sky.rotation), "strength": sky.strength}
 
 
-def refresh_sky(scene: bpy.types.Scene) -> None:
-    """Nothing of the shot has changed."""
+def key(scene: bpy.types.Scene) -> tuple:
+    """All that the thumbnail depends on besides the shot."""
+    return (_image_key(_image_of(scene)), *look(scene).items())
 
 
 def _sky_of(scene: bpy.types.Scene) -> np.ndarray:
     """The scene's sky, small, row 0 at the top; it is read once for each image."""
-    try:
-        image = environment.read(scene).image
-    except physics.BlackHoleError:
-        image = None
-    key = () if image is None else (image.name, image.filepath, tuple(image.size), image.is_dirty)
+    image = _image_of(scene)
     known = _skies.get(scene.name)
-    if known is None or known.key != key:
-        known = _Sky(key, _squares() if image is None else _shrunk(image))
+    if known is None or known.key != _image_key(image):
+        known = _Sky(_image_key(image), _squares() if image is None else _shrunk(image))
         _skies[scene.name] = known
     return known.pixels
+
+
+def _image_of(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    try:
+        return environment.read(scene).image
+    except physics.BlackHoleError:
+        return None
+
+
+def _image_key(image: bpy.types.Image | None) -> tuple:
+    return () if image is None else (image.name, image.filepath, tuple(image.size), image.is_dirty)
 
 
 def _squares() -> np.ndarray:

@@ -12,9 +12,10 @@ from . import environment, world_group, world_nodes
 from .errors import SceneError
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
-BEFORE, IS_BENT = "umbra_world_before", "umbra_world_bent"
-# On the lensed World: what it was made of, and the image that reads its maps.
+BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
+# On the lensed World: what it was made of, the image that reads its maps, and those that the preview's map is kept in.
 LENSED, FILE_IMAGE = "umbra_lensed", "umbra_world_map"
+LIVE_IMAGES = ("umbra_live_map_1", "umbra_live_map_2")
 OF_IMAGE, OF_WORLD = "image", "world"
 
 # Resolution of the map by which Cycles samples the World's light. Its own choice for a World of many nodes is 4096, which
@@ -89,7 +90,7 @@ def forget(scene: bpy.types.Scene) -> None:
 def _delete(world: bpy.types.World) -> None:
     node = group_node(world)
     group = None if node is None else node.node_tree
-    images = {image for image in [world.get(FILE_IMAGE)] if image is not None}
+    images = {image for image in map(world.get, (FILE_IMAGE, *LIVE_IMAGES)) if image is not None}
     bpy.data.worlds.remove(world)
     if group is None or group.users > 0:
         return

@@ -142,39 +142,81 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
 
 def shows_live(scene: bpy.types.Scene) -> bool:
     """Whether the World reads the preview's map."""
-    group = getattr(world_output.group_node(world_output.lensed_world(scene)), "node_tree", None)
-    if group is None:
-        return False
-    return any(node.image is not None and node.image.source == "GENERATED" for node in map_nodes(group))
+    return _shown_live(scene) is not None
+
+
+def live_images(world: bpy.types.World) -> list[bpy.types.Image]:
+    """The images that the preview's map is kept in."""
+    return [world[key] for key in world_output.LIVE_IMAGES if world.get(key) is not None]
+
+
+def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    """The image of the preview's map that the World reads now."""
+    world = world_output.lensed_world(scene)
+    if world is None:
+        return None
+    read = {each.image for each in map_nodes(world_output.group_node(world).node_tree)}
+    image = read.pop() if len(read) == 1 else None
+    return image if image in live_images(world) else None
 
 
 def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
-    """Let the World read a map that is in memory; always through the same image."""
-    group = _group(scene)
-    if group is None:
+    """Let the World read a map that is in memory; always through the same image, or through two in turn."""
+    world = world_output.lensed_world(scene)
+    if world is None:
         return
+    shown = _shown_live(scene)
+    key = _next_key(scene, world, shown)
+    image = world.get(key)
     rows, columns = made.texture.shape[:2]
-    image = next((node.image for node in map_nodes(group) if _is_live(node.image, (columns, rows))), None)
-    if image is None:
+    if image is None or tuple(image.size) != (columns, rows):
         image = bpy.data.images.new(LIVE_IMAGE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
         image.alpha_mode = "CHANNEL_PACKED"
         image.use_half_precision = False
+        world[key] = image
     image.pixels.foreach_set(np.ravel(made.texture))
     image.update()
-    _point(scene, image)
+    if shown is None:
+        _point(scene, image)
+    elif shown != image:  # looking after the group, too, would take longer than the map
+        for node in map_nodes(world_output.group_node(world).node_tree):
+            node.image = image
 
 
-def _is_live(image: bpy.types.Image | None, size: tuple[int, int]) -> bool:
-    return image is not None and image.source == "GENERATED" and tuple(image.size) == size
+def _next_key(scene: bpy.types.Scene, world: bpy.types.World, shown: bpy.types.Image | None) -> str:
+    """Under which key the next map goes: Cycles keeps the pixels of an image for as long as a shader reads it."""
+    first, second = world_output.LIVE_IMAGES
+    return second if needs_turns(scene) and shown is not None and shown == world.get(first) else first
+
+
+def needs_turns(scene: bpy.types.Scene) -> bool:
+    """Whether a map that has changed must come as another image to be seen."""
+    return scene.render.engine == "CYCLES"
+
+
+def show_again(scene: bpy.types.Scene) -> None:
+    """Let Cycles see the map once more: of two changes between two of its looks it has seen neither."""
+    shown = _shown_live(scene)
+    if shown is None:
+        return
+    rows, columns = shown.size[1], shown.size[0]
+    texture = np.empty(rows * columns * 4, np.float32)
+    shown.pixels.foreach_get(texture)
+    show_live(scene, world_map.WorldMap(texture.reshape(rows, columns, 4), {}))
 
 
 def drop_live(scene: bpy.types.Scene) -> None:
     """Let the World read its files again, and free the preview's map."""
-    group = _group(scene)
-    images = set() if group is None else {node.image for node in map_nodes(group) if node.image is not None}
+    world = world_output.lensed_world(scene)
+    if world is None:
+        return
     point_at_files(scene)
+    images = live_images(world)
+    for key in world_output.LIVE_IMAGES:
+        if key in world:
+            del world[key]
     for image in images:
-        if image.source == "GENERATED" and image.users == 0:
+        if image.users == 0:
             bpy.data.images.remove(image)
 
 
