@@ -29,7 +29,9 @@ class _State:
     """What the preview of one scene has shown, and is at work on."""
 
     shown: object = None
-    """What the map was made from."""
+    """What is shown, or in the making."""
+    map_shown: object = None
+    """What the World's map was made from."""
     steps: Generator[None, None, None] | None = None
     changed: bool = True
     updates: int = 0
@@ -73,7 +75,7 @@ def on_switched(scene: bpy.types.Scene) -> None:
     """The artist has switched the preview on or off."""
     if is_on(scene):
         if can_run():
-            state(scene).shown = None
+            state(scene).shown = state(scene).map_shown = None
             _note(scene)
         return
     _states.pop(scene.name, None)
@@ -95,7 +97,7 @@ def start_again() -> None:
     """Show all previews anew: after undo, or when a file was opened or saved."""
     for scene in bpy.data.scenes:
         if is_on(scene) and can_run():
-            state(scene).shown = None
+            state(scene).shown = state(scene).map_shown = None
             _note(scene)
 
 
@@ -213,12 +215,15 @@ def _work(
     tolerance, _ = ACCURACIES["DRAFT"]
     draft = replace(frame.parameters, tolerance=tolerance, method=physics.DEFAULT_METHOD, disk=None)
     scene = bpy.data.scenes.get(name)
-    if scene is not None and world_output.lensed_world(scene) is not None:
-        made = yield from _paused(world_map.world_map_steps(world_map.world_parameters(draft, world_map.PREVIEW)))
+    wanted = world_map.world_parameters(draft, world_map.PREVIEW)
+    is_lensed = scene is not None and world_output.lensed_world(scene) is not None
+    if is_lensed and (wanted != now.map_shown or not world_sync.shows_live(scene)):
+        made = yield from _paused(world_map.world_map_steps(wanted))
         scene = bpy.data.scenes.get(name)
         if scene is None:
             return
         world_sync.show_live(scene, made)
+        now.map_shown = wanted
         now.settle_at = time.perf_counter() + SETTLE if world_sync.needs_turns(scene) else None
         now.latency = time.perf_counter() - now.since
         _redraw()

@@ -88,10 +88,17 @@ def _point(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
                     setattr(node.image_user, name, value)
 
 
+def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
+    """An image that a World remembers; not one that it shares with the World it is a copy of."""
+    image = world.get(key)
+    shared = any(each != world and each.get(key) == image for each in bpy.data.worlds)
+    return None if shared else image
+
+
 def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
     """The image that reads the scene's maps: the one in use, or another."""
     world = world_output.lensed_world(scene)
-    present = world.get(world_output.FILE_IMAGE)
+    present = _own(world, world_output.FILE_IMAGE)
     if present is None:
         present = sync.map_image(FILE_IMAGE_NAME)
         present.use_half_precision = False
@@ -167,7 +174,7 @@ def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
         return
     shown = _shown_live(scene)
     key = _next_key(scene, world, shown)
-    image = world.get(key)
+    image = _own(world, key)
     rows, columns = made.texture.shape[:2]
     if image is None or tuple(image.size) != (columns, rows):
         image = bpy.data.images.new(LIVE_IMAGE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
@@ -176,10 +183,11 @@ def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
         world[key] = image
     image.pixels.foreach_set(np.ravel(made.texture))
     image.update()
-    if shown is None:
+    tree = world_output.group_node(world).node_tree
+    if shown is None or tree.users > 1:
         _point(scene, image)
     elif shown != image:  # looking after the group, too, would take longer than the map
-        for node in map_nodes(world_output.group_node(world).node_tree):
+        for node in map_nodes(tree):
             node.image = image
 
 
