@@ -29,7 +29,9 @@ SHARED = {
     "sky_temperature": "Sky Temperature",
 }
 
-EXPOSURE = "Exposure"
+# What the image of a lensed World is placed by, and the sockets of the compositor's group that say the same.
+PLACEMENT = {"Rotation": "Environment Rotation", "Strength": "Environment Strength"}
+CARRIED = ("Exposure", *PLACEMENT.values())
 
 _switching = False
 
@@ -105,7 +107,10 @@ def _to_world(scene: bpy.types.Scene) -> list[str]:
     for camera in lens_camera.cameras_of(scene):
         lens_camera.restore(camera)
     _leave_compositor(scene)
-    world_sync.set_inputs(node, scene[BEFORE].to_dict()["look"])
+    look = scene[BEFORE].to_dict()["look"]
+    world_sync.set_inputs(node, look)
+    if PLACEMENT["Rotation"] in look:
+        world_output.place(scene, look[PLACEMENT["Rotation"]], look[PLACEMENT["Strength"]])
     world_sync.set_inputs(node, {socket: getattr(scene.umbra, name) for name, socket in SHARED.items()})
     return []
 
@@ -114,6 +119,7 @@ def _leave_world(scene: bpy.types.Scene) -> dict[str, float]:
     """Put the scene's World back; return the values that the artist has given the group."""
     node = world_output.group_node(world_output.lensed_world(scene))
     look = {} if node is None else world_sync.inputs_of(node)
+    look |= {PLACEMENT[name]: value for name, value in world_output.placement(scene).items()}
     world_output.remove(scene)
     return look
 
@@ -155,8 +161,7 @@ def _to_compositor(scene: bpy.types.Scene) -> list[str]:
         setup = find_setup(scene)
         if setup is not None:
             look = before["look"] | {socket: getattr(scene.umbra, name) for name, socket in SHARED.items()}
-            if EXPOSURE in world_look:
-                look[EXPOSURE] = world_look[EXPOSURE]
+            look |= {name: world_look[name] for name in CARRIED if name in world_look}
             for name, value in look.items():
                 if name in setup.group.inputs and not setup.group.inputs[name].is_linked:
                     setup.group.inputs[name].default_value = value

@@ -43,6 +43,7 @@ SEQUENCE_SETTINGS = {
 
 
 def map_image(name: str) -> bpy.types.Image:
+    """An image datablock that reads maps, as yet none."""
     image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP

@@ -30,8 +30,8 @@ LENSING = SocketSpec(
 OTHER_RAYS = SocketSpec(
     "Lensed Light",
     "NodeSocketFloat",
-    "1: light and reflections come from the lensed sky, as it is at the camera's place. 0: only the camera sees it, and "
-    "the scene is lit by the plain sky",
+    "1: light and reflections come from the lensed sky, as it is at the camera's place. 0: only the camera sees it, "
+    "and the scene is lit by the plain sky",
     default=1.0,
     minimum=0.0,
     maximum=1.0,

@@ -18,8 +18,8 @@ LENSED, FILE_IMAGE = "umbra_lensed", "umbra_world_map"
 LIVE_IMAGES = ("umbra_live_map_1", "umbra_live_map_2")
 OF_IMAGE, OF_WORLD = "image", "world"
 
-# Resolution of the map by which Cycles samples the World's light. Its own choice for a World of many nodes is 4096, which
-# takes 12 seconds a frame to fill.
+# Resolution of the map by which Cycles samples the World's light. Its own choice here is one that takes 12 seconds a
+# frame to fill.
 IMPORTANCE_RESOLUTION = 512
 
 # Kinds of nodes that look in the ray's direction when their input Vector is not linked.
@@ -68,6 +68,30 @@ def install(scene: bpy.types.Scene) -> bpy.types.Node:
     scene[IS_BENT] = True
     scene.world = made
     return node
+
+
+def place(scene: bpy.types.Scene, rotation: tuple[float, ...], strength: float) -> None:
+    """Turn and brighten the image that a lensed World shows, if it was made of one."""
+    world = lensed_world(scene)
+    if world is not None and world[LENSED] == OF_IMAGE:
+        sockets = _placement(world)
+        sockets["Rotation"].default_value = rotation
+        sockets["Strength"].default_value = strength
+
+
+def placement(scene: bpy.types.Scene) -> dict[str, object]:
+    """Rotation and strength of the image that a lensed World shows, none if it was not made of one."""
+    world = lensed_world(scene)
+    if world is None or world[LENSED] != OF_IMAGE:
+        return {}
+    values = {name: socket.default_value for name, socket in _placement(world).items()}
+    return {name: value if isinstance(value, float) else tuple(value) for name, value in values.items()}
+
+
+def _placement(world: bpy.types.World) -> dict[str, bpy.types.NodeSocket]:
+    names = {"MAPPING": "Rotation", "BACKGROUND": "Strength"}
+    nodes = [node for node in world.node_tree.nodes if node.type in names]
+    return {names[node.type]: node.inputs[names[node.type]] for node in nodes}
 
 
 def remove(scene: bpy.types.Scene) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which map a lensed World reads: the files of the frames, none at all, or the one that the preview keeps up to date."""
+"""Which map a lensed World reads: the files of the frames, none at all, or the one that the preview keeps."""
 
 import bpy
 import numpy as np
@@ -257,6 +257,6 @@ def check_resolved(metadata: dict, frame_shot: shot.Shot) -> None:
     if unresolved:
         label = physics.METHODS[frame_shot.parameters.method].label
         raise SceneError(
-            f'Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "{label}"; '
-            'choose the method "Fast" in the Umbra panel, which resolves them.'
+            f"Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "
+            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
         )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lensed sky of one place as a picture that a World shader can look up, whichever way the camera is turned.
 
-The coordinates are those of `sky_table`: across, the position angle psi about the hole's direction; up, the logarithm of
-the distance from the shadow's edge. So a small picture is fine where the sky is crowded, the shadow's edge is a
+The coordinates are those of `sky_table`: across, the position angle psi about the hole's direction; up, the logarithm
+of the distance from the shadow's edge. So a small picture is fine where the sky is crowded, the shadow's edge is a
 function and not a row of pixels, and the map has no poles and no seam: psi is a circle, and the directions are kept as
 vectors. The bottom row is a header with the numbers that lead from a direction to a place in the map. All of this is
 in the axes of the scene's world.
@@ -155,7 +155,7 @@ def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, Wor
     parameters.validate()
     observer, columns, rows = parameters.observer(), parameters.camera.width, parameters.camera.height - 1
     fido = Observer.fido(observer.r, observer.theta, observer.phi)
-    aside, up = cos_sin((np.arange(columns) + 0.5) * (2.0 * math.pi / columns))
+    aside, up = cos_sin((np.arange(columns, dtype=np.float64) + 0.5) * (2.0 * math.pi / columns))
     edge = edge_angles(parameters.spin, fido, aside, up, EDGE_ERROR)
     closest = CLOSEST * float(edge.max())
     heights = np.linspace(math.log(closest) + closest, math.log(math.pi) + math.pi, rows)

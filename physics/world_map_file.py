@@ -17,8 +17,8 @@ FORMAT = MapFormat(
     "umbra world map",
     1,
     "a world map",
-    "Bottom row: header. Others: R, G, B: unit vector towards the light's origin, world axes, 0 if unresolved; A: angle "
-    "from the hole's direction to the shadow's edge, radians. Across: position angle; up: ln(d) + d beside the edge",
+    "Bottom row: header. Others: R, G, B: unit vector towards the light's origin, world axes, 0 if unresolved; A: "
+    "angle from the hole's direction to the shadow's edge, radians. Across: position angle; up: ln(d) + d from it",
 )
 
 # Lengths of vectors in single precision.

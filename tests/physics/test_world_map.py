@@ -60,8 +60,8 @@ def traced(parameters: WarpMapParameters, directions: np.ndarray):
     return fate == Fate.SKY, origin @ np.array(TILTED).T, rays.one_plus_z
 
 
-# The bilinear error falls by four when steps are halved: the grids' steps are 0.14 and 0.03 of s, where the sky turns by
-# up to twice that. The largest errors lie where the sky is crowded, a thousandth of the shadow's size from its edge.
+# The bilinear error falls by four when steps are halved: the grids' steps are 0.14 and 0.03 of s, where the sky turns
+# by up to twice that. The largest errors lie where the sky is crowded, a thousandth of the shadow's size from its edge.
 @pytest.mark.parametrize(("grid", "median", "most"), [(FINAL, 2e-5, 1e-3), (PREVIEW, 4e-4, 1.5e-2)])
 @pytest.mark.parametrize(("spin", "position", "motion", "velocity"), PLACES)
 def test_the_look_up_finds_where_rays_come_from(spin, position, motion, velocity, grid, median, most) -> None:
