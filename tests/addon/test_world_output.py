@@ -234,7 +234,9 @@ def test_the_look_goes_with_the_output(scene) -> None:
     assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
     node = next(each for each in scene_tree(scene).nodes if each.name == "Umbra Black Hole")
     node.inputs["Exposure"].default_value, node.inputs["Redshift Colour"].default_value = 1.5, 0.25
+    node.inputs["Environment Rotation"].default_value = (0.0, 0.0, 0.5)
     switch()
+    assert scene.world.node_tree.nodes["Mapping"].inputs["Rotation"].default_value[2] == 0.5
     assert group(scene).inputs["Exposure"].default_value == 1.5
     assert group(scene).inputs["Redshift Colour"].default_value == 0.25
     group(scene).inputs["Redshift Brightness"].default_value = 0.5
