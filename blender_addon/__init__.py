@@ -6,9 +6,29 @@ from collections.abc import Callable
 
 import bpy
 
-from . import disk_panel, handlers, operators, panels, preview_panel, properties
+from . import (
+    cache_panel,
+    command,
+    disk_panel,
+    farm_copy,
+    farm_templates,
+    handlers,
+    operators,
+    panels,
+    preview_panel,
+    properties,
+)
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *disk_panel.CLASSES, *preview_panel.CLASSES)
+_CLASSES = (
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *disk_panel.CLASSES,
+    *cache_panel.CLASSES,
+    *farm_copy.CLASSES,
+    *farm_templates.CLASSES,
+    *preview_panel.CLASSES,
+)
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
 # fails loudly, so that it can be tried again.
@@ -23,7 +43,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, preview_panel, handlers):
+        for module in (properties, operators, preview_panel, handlers, command):
             module.register()
             _undo.append(module.unregister)
     except BaseException:
