@@ -349,3 +349,11 @@ def test_a_changed_group_is_mended_when_a_file_is_opened(scene, physics, tmp_pat
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
     scene = bpy.context.scene
     assert np.allclose(render(scene, tmp_path / "again.exr", physics.exr), expected, atol=1e-6)
+
+
+def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
+    switch()
+    render(scene, tmp_path / "picture.exr", physics.exr)
+    (path,) = Path(scene.umbra.map_folder).glob("*.exr")
+    assert modules("cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
+    assert modules("maps").kind_of(path).noun == "world map"
