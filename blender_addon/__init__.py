@@ -6,9 +6,17 @@ from collections.abc import Callable
 
 import bpy
 
-from . import cache_panel, command, disk_panel, handlers, operators, panels, properties
+from . import cache_panel, command, disk_panel, farm_copy, farm_templates, handlers, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *disk_panel.CLASSES, *cache_panel.CLASSES)
+_CLASSES = (
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *disk_panel.CLASSES,
+    *cache_panel.CLASSES,
+    *farm_copy.CLASSES,
+    *farm_templates.CLASSES,
+)
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
 # fails loudly, so that it can be tried again.
