@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import bpy
 
-from . import lens_sync, maps, shot, sync, world_sync
+from . import lens_sync, maps, shot, stopping, sync, world_sync
 from ._physics import claim, exit_map, exit_map_file, physics, world_map, world_map_file
 from .compositor_tree import find_setup
 from .errors import SceneError
@@ -154,15 +154,31 @@ def provide_map(
     noun = maps.kind_of(path).noun
     with claim.Claims() as claims:
         if not take(claims, path, parameters):
-            print(f"Umbra: waiting for the {noun} of frame {frame}, which {claims.holder(path)} bakes", flush=True)
-            while not take(claims, path, parameters):
-                time.sleep(POLL)
+            _wait_for_claim(claims, path, parameters, f"the {noun} of frame {frame}")
         if maps.is_fresh(path, parameters):
             return
         where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
         print(f"Umbra: baking the {noun} of frame {frame}{where}", flush=True)
         for _fraction in bake_map(path, parameters):
             claims.beat()
+
+
+def _wait_for_claim(
+    claims: claim.Claims, path: Path, parameters: "physics.WarpMapParameters", what: str
+) -> None:
+    """Claim a map once the process that is baking it has ended, or is found dead.
+
+    Raises
+    ------
+    SceneError
+        The process was asked to end.
+    """
+    print(f"Umbra: waiting for {what}, which {claims.holder(path)} bakes", flush=True)
+    with stopping.stoppable() as stop:
+        while not take(claims, path, parameters):
+            if stop.asked:
+                raise SceneError(f"Stopped while waiting for {what}, which {claims.holder(path)} bakes.")
+            time.sleep(POLL)
 
 
 def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.WarpMapParameters":
@@ -339,6 +355,8 @@ def take(
     try:
         if not claims.take(path):
             return False
+        if not claims.owns(path):  # a bake beside this render is making it: its half files are alive
+            return True
         for one in (path, *maps.pass_paths(path, parameters)):
             for half in half_files.pop(one.name, ()):
                 half.unlink(missing_ok=True)
