@@ -13,9 +13,8 @@ from pathlib import Path
 
 import bpy
 
-from . import lens_sync, maps, shot, sync
+from . import lens_disk, lens_sync, maps, shot, sync
 from ._physics import exit_map, exit_map_file, physics
-from .compositor_tree import find_setup
 from .errors import SceneError
 
 # What the maps of one bake or render have in common is kept here.
@@ -139,6 +138,16 @@ def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.War
     return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
 
 
+def maps_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "list[tuple[Path, physics.WarpMapParameters]]":
+    """All that a shot needs baked: where it lies, and what it is made from."""
+    needed = []
+    if not lens_sync.is_on(scene) or lens_sync.uses_maps(scene):
+        needed.append((path_of(scene, frame_shot), parameters_of(scene, frame_shot)))
+    if lens_sync.is_on(scene) and frame_shot.parameters.disk is not None and lens_disk.is_in_use(scene):
+        needed.append((lens_disk.path_of(scene, frame_shot), lens_disk.parameters_of(scene, frame_shot)))
+    return needed
+
+
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     """Where the map of a shot lies, or will lie."""
     if lens_sync.is_on(scene):
@@ -179,26 +188,25 @@ def bake_frames(
             with _naming(frame, len(wanted)):
                 layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
                 frame_shot = shot.read_at(scene, frame, layer)
-                parameters = parameters_of(scene, frame_shot)
-                path = path_of(scene, frame_shot)
+                needed = maps_of(scene, frame_shot)
                 summary.folder = maps.folder(scene)
                 yield Progress(frame, index / len(wanted), text)
-                if maps.is_fresh(path, parameters):
-                    summary.reused.append(frame)
-                    continue
-                steps = _steps(path, parameters)
-                while True:
-                    try:
-                        fraction = next(steps)
-                    except StopIteration as end:
-                        baked = end.value
-                        break
-                    yield Progress(frame, (index + fraction) / len(wanted), text)
-            summary.unresolved += baked.counts.get("unresolved", 0)
-            while not writing.wait(WAIT):
-                yield Progress(frame, (index + 1) / len(wanted), text)
-            writing.start(functools.partial(_write, path, baked, frame, len(wanted)))
-            summary.baked.append(frame)
+                stale = [each for each in needed if not maps.is_fresh(*each)]
+            for number, (path, parameters) in enumerate(stale):
+                with _naming(frame, len(wanted)):
+                    steps = _steps(path, parameters)
+                    while True:
+                        try:
+                            fraction = next(steps)
+                        except StopIteration as end:
+                            baked = end.value
+                            break
+                        yield Progress(frame, (index + (number + fraction) / len(stale)) / len(wanted), text)
+                summary.unresolved += baked.counts.get("unresolved", 0)
+                while not writing.wait(WAIT):
+                    yield Progress(frame, (index + (number + 1) / len(stale)) / len(wanted), text)
+                writing.start(functools.partial(_write, path, baked, frame, len(wanted)))
+            (summary.baked if stale else summary.reused).append(frame)
         while not writing.wait(WAIT):
             yield Progress(wanted[-1], 1.0, "Writing")
     finish(scene_name)
@@ -226,8 +234,11 @@ def finish(scene_name: str) -> None:
     """Let the compositor see new maps."""
     forget_shared_rays()
     scene = bpy.data.scenes.get(scene_name)
-    if scene is not None and find_setup(scene) is not None:
-        sync.refresh(scene)
+    if scene is not None:
+        if lens_sync.is_on(scene):
+            lens_disk.point_at_passes(scene)
+        else:
+            sync.refresh(scene)
         sync.forget_loaded_map(scene)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, shot, sync
+from . import baking, disk_light, disk_sync, lens_disk, lens_render, lens_sync, maps, messages, node_group, shot, sync
 from ._physics import physics
 from .compositor_tree import check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -54,7 +54,7 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
         messages.end_process(text)
         return
     if lens_sync.is_on(scene):
-        lens_sync.break_camera(scene)
+        lens_render.take_away(scene)
     else:
         sync.point_at_nothing(scene)
     messages.warn(text)
@@ -78,18 +78,22 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if lens_sync.is_on(scene):
         _rendering.add(scene.name)
         _guarded(lens_render.begin, scene)
-        return
+        if not lens_disk.is_in_use(scene):
+            return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
+    if lens_sync.is_on(scene):
+        return
     _guarded(sync.sync_sky, scene)
     _guarded(disk_sync.refresh, scene)
 
 
 @persistent
 def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
-    """A frame begins."""
+    """A frame begins; what is changed now is still evaluated for it."""
+    _guarded(lambda each: disk_light.follow(each, shot.find_active_hole(each)), scene)
     if not _is_ours(scene):
         return
     if messages.is_ending():
@@ -103,8 +107,10 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     """The frame is evaluated."""
     if _busy or depsgraph is None:
         return
-    if depsgraph.mode != "RENDER" and lens_sync.is_on(scene) and scene.name not in _rendering:
-        lens_sync.show_live(scene, depsgraph)
+    if depsgraph.mode != "RENDER" and scene.name not in _rendering:
+        disk_light.follow(scene, shot.find_active_hole(scene))
+        if lens_sync.is_on(scene):
+            lens_sync.show_live(scene, depsgraph)
     if depsgraph.mode != "RENDER" or scene.name not in _waiting:
         return
     _guarded(lambda each: _provide_map(each, depsgraph), scene)
@@ -151,7 +157,7 @@ def _is_ours(scene: bpy.types.Scene) -> bool:
 
 def _take_map_away(scene: bpy.types.Scene) -> None:
     if lens_sync.is_on(scene):
-        lens_sync.break_camera(scene)
+        lens_render.take_away(scene)
         return
     sync.point_at_nothing(scene)
     check_rendered(scene)
@@ -221,6 +227,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     for scene in bpy.data.scenes:
         if lens_sync.is_on(scene) and scene.library is None:
             lens_sync.show_live(scene)
+            _guarded(disk_sync.refresh, scene)
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
             setup.group.node_tree = node_group.ensure_group()
@@ -231,7 +238,9 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     for scene in bpy.data.scenes:
-        if find_setup(scene) is None:
+        if lens_sync.is_on(scene):
+            lens_disk.point_at_passes(scene)
+        elif find_setup(scene) is None:
             continue
         sync.refresh(scene)
         try:
@@ -241,6 +250,8 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
             continue
         if folder is not None:
             sync.move_map_path(scene, folder)
+            if lens_sync.is_on(scene):
+                lens_disk.move_passes(scene, folder)
 
 
 # --- registration ---------------------------------------------------------------------------------

@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import compositing, foreground, lens_camera, lens_shader, lens_sync, messages
+from . import compositing, disk_sync, foreground, lens_camera, lens_disk, lens_shader, lens_sync, messages, shot
 from ._physics import physics
-from .compositor_tree import find_setup
+from .compositor_tree import find_setup, find_tree
 from .errors import SceneError
 from .properties import COMPOSITOR, CYCLES_LENS
 
@@ -41,6 +41,7 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
         _switching = False
     if wanted == CYCLES_LENS:
         lens_sync.show_live(scene)
+        disk_sync.refresh(scene)
     return notes
 
 
@@ -65,6 +66,9 @@ def on_switched(scene: bpy.types.Scene) -> None:
 
 def _to_lens(scene: bpy.types.Scene) -> list[str]:
     lens_sync.check(scene)
+    tree, hole = find_tree(scene), shot.find_active_hole(scene)
+    if tree is not None and hole is not None and hole.umbra.disk.enabled:
+        compositing.check_shared(scene, tree)
     lens_sync.camera_of(scene)
     lens_shader.bytecode(uses_map=False)
     for camera in lens_camera.cameras_of(scene):
@@ -88,6 +92,7 @@ def _to_lens(scene: bpy.types.Scene) -> list[str]:
 
 
 def _to_compositor(scene: bpy.types.Scene) -> list[str]:
+    lens_disk.take_out(scene)
     foreground.remove(scene)
     for camera in lens_camera.cameras_of(scene):
         lens_camera.restore(camera)
