@@ -68,7 +68,7 @@ LOOK_SOCKETS = {
 BEAMING, PAGE_THORNE, PERIOD = "Beaming", "Page-Thorne", "Pattern Period"
 PHASE, FIRST_TURN, SECOND_TURN = "Pattern Phase", "First Turn", "Second Turn"
 SPIN, DIRECTION, INNER, OUTER = "Spin", "Direction", "Inner Edge", "Outer Edge"
-INNERMOST, PEAK = "Innermost Orbit", "Largest Flux"
+INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
 _INPUTS = (
     _picture(BEHIND, "What is behind the disk, of the render's size"),
@@ -86,7 +86,7 @@ _INPUTS = (
     _number(INNER, "Radius of the inner edge, units of M", 6.0, 0.0),
     _number(OUTER, "Radius of the outer edge, units of M", 20.0, 0.0),
     _number(INNERMOST, "Radius of the innermost stable orbit, units of M", 6.0, 0.0),
-    _number(PEAK, "Page and Thorne's flux where it is largest", 1e-4, 0.0),
+    _number(FLUX_FACTOR, "By which Page and Thorne's flux becomes 1 where it is largest", 7000.0, 0.0),
     _number(PAGE_THORNE, "1: the brightness follows Page and Thorne's flux, 0: a power of the radius", 1.0, 0.0, 1.0),
     _number(LOOK_SOCKETS["exponent"], "Power of the radius by which the brightness falls", _LOOK.exponent, 0.0, 20.0),
     SocketSpec(
@@ -168,7 +168,7 @@ def _disk_inputs(sockets: dict[str, Socket], names: tuple[str, ...]) -> disk_nod
         inner=sockets[INNER],
         outer=sockets[OUTER],
         innermost=sockets[INNERMOST],
-        peak=sockets[PEAK],
+        flux_factor=sockets[FLUX_FACTOR],
         page_thorne=sockets[PAGE_THORNE],
         beaming=sockets[BEAMING],
         **{field: sockets[name] for field, name in LOOK_SOCKETS.items()},

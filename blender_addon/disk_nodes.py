@@ -37,7 +37,7 @@ class DiskInputs:
     inner: Socket
     outer: Socket
     innermost: Socket
-    peak: Socket
+    flux_factor: Socket
     page_thorne: Socket
     exponent: Socket
     temperature: Socket
@@ -203,7 +203,8 @@ def _flux(builder: TreeBuilder, inputs: DiskInputs, terms: _FluxTerms, radius: S
         log = builder.math("LOGARITHM", log, math.e)
         total = builder.math("SUBTRACT", total, builder.math("MULTIPLY", weight, log))
         under = builder.math("MULTIPLY", under, way)
-    steady = builder.math("DIVIDE", builder.math("MULTIPLY", total, 1.5), builder.math("MULTIPLY", under, inputs.peak))
+    total = builder.math("MULTIPLY", builder.math("MULTIPLY", total, 1.5), inputs.flux_factor)
+    steady = builder.math("DIVIDE", total, under)
     steady = builder.math("MULTIPLY", steady, builder.math("GREATER_THAN", radius, inputs.innermost))
     ratio = builder.math("DIVIDE", inputs.inner, builder.math("MAXIMUM", radius, inputs.inner))
     power = builder.math("POWER", ratio, inputs.exponent)

@@ -242,10 +242,11 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         description="Radius of the innermost stable orbit of the disk's matter, units of M",
         get=lambda settings: metric.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
     )
-    largest_flux: bpy.props.FloatProperty(
-        name="Largest Flux",
-        description="Page and Thorne's flux where it is largest",
-        get=lambda settings: disk_flux.peak_flux(settings.id_data.umbra.spin, settings.retrograde),
+    flux_factor: bpy.props.FloatProperty(
+        name="Flux Factor",
+        description="By which Page and Thorne's flux becomes 1 where it is largest",
+        # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
+        get=lambda settings: 1.0 / disk_flux.peak_flux(settings.id_data.umbra.spin, settings.retrograde),
     )
 
 

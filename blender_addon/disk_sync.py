@@ -144,6 +144,8 @@ def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.N
         behind = node.inputs.get(disk_group.BEHIND)
         picture = behind.links[0].from_socket if behind is not None and behind.is_linked else None
         _remove_drivers(tree, node.path_from_id() + ".")
+        for link in [link for socket in node.inputs for link in socket.links]:
+            tree.links.remove(link)  # kept, they would go by the order of the sockets
         for role in (*(pass_role(number) for number in range(images + 1, physics.MOST_CROSSINGS + 1)), *FORMER_ROLES):
             _remove_node(tree, role)
         node.node_tree = group
@@ -218,7 +220,7 @@ def _geometry(
     animated = animated_paths(hole)
     turning = disk_animation.SPIN in animated
     inner, outer = disk.radii(spin)
-    orbit, flux = "umbra.disk.innermost_orbit", "umbra.disk.largest_flux"
+    orbit, factor = "umbra.disk.innermost_orbit", "umbra.disk.flux_factor"
     inner_path = orbit if disk.inner_radius is None else disk_animation.INNER
     inner_moves = turning if disk.inner_radius is None else disk_animation.INNER in animated
     return {
@@ -226,10 +228,8 @@ def _geometry(
         disk_group.DIRECTION: (orbiting_matter.matter_direction(spin, disk.retrograde), None),
         disk_group.INNER: (inner, inner_path if inner_moves else None),
         disk_group.OUTER: (outer, disk_animation.OUTER if disk_animation.OUTER in animated else None),
-        disk_group.INNERMOST: (
-            metric.isco_radius(spin, prograde=not disk.retrograde), orbit if turning else None
-        ),
-        disk_group.PEAK: (disk_flux.peak_flux(spin, disk.retrograde), flux if turning else None),
+        disk_group.INNERMOST: (metric.isco_radius(spin, not disk.retrograde), orbit if turning else None),
+        disk_group.FLUX_FACTOR: (1.0 / disk_flux.peak_flux(spin, disk.retrograde), factor if turning else None),
     }
 
 

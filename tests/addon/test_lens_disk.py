@@ -12,7 +12,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from small_scene import links_of, render, run_python, shrink
+from small_scene import compositor, links_of, render, run_python, shrink
 
 LIGHT = 2e-3
 TYPICAL = 2e-5
@@ -62,7 +62,8 @@ def expected_picture(
     passes = [modules.physics.read_disk_pass(each) for each in paths]
     time = scene.frame_current * settings.turning_speed * scene.render.fps_base / scene.render.fps
     look, texture = addon_module("disk_properties").look_of(settings), addon_module("disk_images").streaks()
-    light, through = modules.disk_render.disk_layers(passes, look, texture, time)
+    period = addon_module("disk_animation").pattern_period(scene, scene.umbra.active_hole)
+    light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
     size = behind.shape[1], behind.shape[0]
     return modules.disk_render.over_sky(behind, light, through), modules.reference_render.resize(light, size)
 
@@ -128,3 +129,165 @@ def test_disk_is_in_front_of_what_the_lens_shows(scene, tmp_path, exr, addon_mod
     assert (light.max(axis=-1) > 0.1)[covered].sum() > 10
     assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
     assert_same(render(scene, tmp_path / "after.exr", exr), expected, light)
+
+
+def state_of(scene: bpy.types.Scene, tree: bpy.types.NodeTree | None) -> dict[str, object]:
+    """What the disk in a lens changes."""
+    render_names = ("use_compositing", "compositor_precision", "compositor_device", "film_transparent")
+    return {
+        "links": None if tree is None else links_of(tree),
+        "nodes": None if tree is None else sorted(node.name for node in tree.nodes),
+        "drivers": 0 if tree is None or tree.animation_data is None else len(tree.animation_data.drivers),
+        "use_nodes": bpy.app.version >= (5, 0) or scene.use_nodes,
+        "groups": sorted(bpy.data.node_groups.keys()),
+        "images": sorted(bpy.data.images.keys()),
+        **{name: getattr(scene.render, name) for name in render_names if hasattr(scene.render, name)},
+    }
+
+
+def artists_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
+    """A compositor in which the render goes through a glow to the output, and to a viewer."""
+    tree = compositor(scene)
+    layer = next(node for node in tree.nodes if node.type == "R_LAYERS")
+    output = next(node for node in tree.nodes if node.type in ("COMPOSITE", "GROUP_OUTPUT"))
+    glow, viewer = tree.nodes.new("CompositorNodeGlare"), tree.nodes.new("CompositorNodeViewer")
+    tree.links.new(layer.outputs["Image"], glow.inputs["Image"])
+    tree.links.new(glow.outputs["Image"], output.inputs[0])
+    tree.links.new(layer.outputs["Image"], viewer.inputs[0])
+    return tree
+
+
+@pytest.mark.parametrize("own_tree", [False, True])
+def test_switching_leaves_no_trace(scene, addon_module, own_tree) -> None:
+    find_tree, in_use = addon_module("compositor_tree").find_tree, addon_module("lens_disk").is_in_use
+    scene.render.compositor_precision = "AUTO"
+    if own_tree:
+        artists_tree(scene)
+    without = state_of(scene, find_tree(scene))
+    hole = add_hole(scene)
+    assert in_use(scene)
+    hole.umbra.disk.enabled = False
+    assert state_of(scene, find_tree(scene)) == without
+    hole.umbra.disk.enabled = True
+    hole.umbra.disk.crossings = 5
+    assert in_use(scene)
+    scene.umbra.output = "COMPOSITOR"
+    assert state_of(scene, find_tree(scene)) == without
+
+
+@pytest.mark.parametrize("own_tree", [False, True])
+def test_the_bent_sky_and_its_disk_come_back(scene, addon_module, own_tree) -> None:
+    find_tree = addon_module("compositor_tree").find_tree
+    if own_tree:
+        artists_tree(scene)
+    add_hole(scene, output="COMPOSITOR")
+    assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
+    before = state_of(scene, find_tree(scene))
+    assert before["drivers"] > 0
+    for _ in range(2):
+        scene.umbra.output = "CYCLES_LENS"
+        assert addon_module("lens_disk").is_in_use(scene)
+        assert addon_module("compositor_tree").find_setup(scene) is None
+        scene.umbra.output = "COMPOSITOR"
+        assert state_of(scene, find_tree(scene)) == before
+
+
+@pytest.mark.parametrize("disk_first", [True, False])
+def test_disk_and_foreground_share_the_compositor(scene, addon_module, disk_first) -> None:
+    """Whichever goes first, the other stays, and when both are gone nothing is left."""
+    find_tree, find_node = addon_module("compositor_tree").find_tree, addon_module("compositor_tree").find_node
+    bpy.ops.mesh.primitive_cube_add(size=0.25, location=(0.3, -4.0, 1.0))
+    without = state_of(scene, find_tree(scene))
+    hole = add_hole(scene)
+    hole.umbra.disk.enabled = disk_first
+    assert bpy.ops.umbra.set_up_foreground() == {"FINISHED"}
+    hole.umbra.disk.enabled = True
+    tree = find_tree(scene)
+    over, disk = find_node(tree, "foreground_over"), find_node(tree, "disk")
+    behind = over.inputs.get("Background") or next(each for each in over.inputs if each.type == "RGBA")
+    assert behind.links[0].from_node == disk
+    if disk_first:
+        hole.umbra.disk.enabled = False
+        assert behind.links[0].from_node.type == "R_LAYERS"
+        assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
+    else:
+        assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
+        assert addon_module("lens_disk").is_in_use(scene)
+        hole.umbra.disk.enabled = False
+    assert state_of(scene, find_tree(scene)) == without
+
+
+def test_animation_in_background_bakes_or_takes_what_is_baked(scene, tmp_path, exr, addon_module) -> None:
+    """Two frames of a moving camera and a spin with keyframes, rendered as on a farm, with No Bake too."""
+    hole = add_hole(scene)
+    scene.umbra.map_folder = "//maps/"
+    for frame, height, spin in ((1, 1.5, 0.3), (2, 1.2, 0.95)):
+        scene.camera.location.z = height
+        scene.camera.keyframe_insert("location", frame=frame)
+        hole.umbra.spin = spin
+        hole.keyframe_insert("umbra.spin", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 2
+    blend = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    baked = {path: path.stat().st_mtime_ns for path in (tmp_path / "maps").iterdir()}
+    assert len(baked) == 2 * 5
+    scene.render.filepath = str(tmp_path / "frame_####.exr")
+    bpy.ops.render.render(animation=True)
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "maps").iterdir()} == baked
+    pictures = []
+    for frame in (1, 2):
+        scene.frame_set(frame)
+        behind = without_disk(scene, tmp_path / "without.exr", exr)
+        pictures.append(exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")[0])
+        assert_same(pictures[-1], *expected_picture(scene, addon_module, behind))
+    assert np.abs(pictures[0] - pictures[1]).max() > 0.1
+    for path in baked:
+        path.unlink()
+    done = run_python(
+        f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n"
+        "scene = bpy.context.scene\n"
+        "scene.umbra.lens_rays = 'IN_SHADER'\n"
+        f"scene.render.filepath = {str(tmp_path / 'farm_####.exr')!r}\n"
+        "bpy.ops.render.render(animation=True)\n"
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    for frame, picture in zip((1, 2), pictures, strict=True):
+        there, _ = exr.read_exr(tmp_path / f"farm_{frame:04d}.exr")
+        # the shader's own rays are single precision; see `test_lens`
+        assert np.abs(there - picture).mean() < 2e-3
+
+
+def test_a_missing_pass_ends_the_process(scene, tmp_path) -> None:
+    add_hole(scene)
+    scene.umbra.auto_bake = False
+    scene.umbra.lens_rays = "IN_SHADER"
+    blend = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    done = run_python(
+        f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n"
+        f"bpy.context.scene.render.filepath = {str(tmp_path / 'picture.exr')!r}\n"
+        "bpy.ops.render.render(write_still=True)\n"
+    )
+    assert done.returncode == 1
+    assert "is missing: bake it" in done.stderr
+    assert not (tmp_path / "picture.exr").exists()
+
+
+def test_what_is_not_drawn_right_is_named(scene, addon_module) -> None:
+    hole = add_hole(scene)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+
+    def warnings() -> list[str]:
+        depsgraph.update()
+        return addon_module("lens_objects").warnings(scene, depsgraph, addon_module("shot").read(scene, depsgraph))
+
+    assert warnings() == []
+    scene.render.use_compositing = False
+    assert [each[:33] for each in warnings()] == ['The disk of "Hole" is not drawn: ']
+    scene.render.use_compositing = True
+    bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0.0, 2.5, 0.0))
+    hole.umbra.disk.outer_radius = 30.0
+    assert [each.partition(":")[0] for each in warnings()] == [
+        '"Cube" stands beyond the lens sphere and within the disk\'s outer edge'
+    ]
