@@ -7,7 +7,8 @@ Non-Color and Channel Packed like the warp map; Colours is a table, and Texture 
 ln(radius) down, see `disk_images`.
 
 A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
-images, and for each way to use the texture; a file has those that it needs.
+images, and for each way to use the texture; a file has those that it needs. Inside is "Umbra Disk Image", another group,
+for each of the images.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import bpy
 from . import disk_nodes
 from ._physics import disk_look
 from .node_helpers import Socket, TreeBuilder
-from .stamped_group import SocketSpec, StampedGroup
+from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
 
 GROUP_NAME = "Umbra Disk"
 GROUP_VERSION = 2
@@ -45,6 +46,7 @@ def _factor(name: str, description: str, default: float) -> SocketSpec:
 
 BEHIND, COLOURS, TEXTURE = "Behind", "Colours", "Texture"
 OUTPUT, IMAGE = "Disk", "Image"
+PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
 
 _LOOK = disk_look.DiskLook()
 
@@ -70,8 +72,8 @@ PHASE, FIRST_TURN, SECOND_TURN = "Pattern Phase", "First Turn", "Second Turn"
 SPIN, DIRECTION, INNER, OUTER = "Spin", "Direction", "Inner Edge", "Outer Edge"
 INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
+_BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
 _INPUTS = (
-    _picture(BEHIND, "What is behind the disk, of the render's size"),
     _picture(COLOURS, "Table of the colours of hot bodies (Non-Color)"),
     _picture(
         TEXTURE,
@@ -132,7 +134,7 @@ def pass_names(images: int) -> tuple[str, ...]:
 
 @cache
 def group_of(images: int, picture: bool = False) -> StampedGroup:
-    """The group for so many images of a disk, with streaks and clumps or with a picture on it."""
+    """The group for so many images of a disk, with streaks and clumps or with a picture on it; see `ensure`."""
     kind = f"{images} Picture" if picture else f"{images}"
     names = pass_names(images)
     passes = tuple(
@@ -141,11 +143,66 @@ def group_of(images: int, picture: bool = False) -> StampedGroup:
     )
 
     def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
-        disk, image = disk_nodes.build(builder, _disk_inputs(sockets, names), picture=picture)
+        inner = image_group(picture).ensure()
+        light: Socket | None = None
+        through: Socket | None = None
+        for name in names:
+            node = builder.node(GROUP_NODE_TYPE, name)
+            node.node_tree = inner
+            builder.feed(node.inputs[PASS], sockets[name])
+            for spec in _INPUTS:
+                builder.feed(node.inputs[spec.name], sockets[spec.name])
+            if light is not None:
+                builder.feed(node.inputs[LIGHT], light)
+                builder.feed(node.inputs[THROUGH], through)
+            light, through = node.outputs[LIGHT], node.outputs[THROUGH]
+        given = [sockets[name] for name in names]
+        disk, image = disk_nodes.build_whole(builder, given, sockets[BEHIND], light, through)
         return {OUTPUT: disk, IMAGE: image}
 
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
-    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, *_INPUTS), _OUTPUTS, build)
+    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
+
+
+@cache
+def image_group(picture: bool) -> StampedGroup:
+    """The group that draws one image of the disk."""
+    kind = "Image Picture" if picture else "Image"
+
+    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+        inputs = _disk_inputs(sockets)
+        light, through = disk_nodes.build_image(
+            builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture
+        )
+        return {LIGHT: light, THROUGH: through}
+
+    inputs = (
+        _picture(PASS, "The baked pass of the image"),
+        SocketSpec(LIGHT, "NodeSocketVector", "Light of the images in front", default=(0.0, 0.0, 0.0)),
+        SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that they leave", default=1.0),
+        *_INPUTS,
+    )
+    outputs = (
+        SocketSpec(LIGHT, "NodeSocketVector", "Light of this image and those in front", in_out="OUTPUT"),
+        SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that is left", in_out="OUTPUT"),
+    )
+    key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
+    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
+
+
+def ensure(images: int, picture: bool) -> bpy.types.NodeTree:
+    """The group for so many images, whole and of this version, and what is inside of it."""
+    image_group(picture).ensure()
+    return group_of(images, picture).ensure()
+
+
+def remove_unused() -> None:
+    """Remove those of the groups that nothing uses any more, and then those that were inside of them."""
+    for inside in (False, True):
+        for tree in list(bpy.data.node_groups):
+            is_inside = any(image_group(picture).owns(tree) for picture in (False, True))
+            if tree.users == 0 and tree.library is None and owns(tree) and is_inside == inside:
+                bpy.data.node_groups.remove(tree)
 
 
 def owns(tree: bpy.types.NodeTree | None) -> bool:
@@ -153,10 +210,9 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
     return tree is not None and any(key.startswith(VERSION_KEY) for key in tree.keys())  # noqa: SIM118
 
 
-def _disk_inputs(sockets: dict[str, Socket], names: tuple[str, ...]) -> disk_nodes.DiskInputs:
+def _disk_inputs(sockets: dict[str, Socket]) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
-        behind=sockets[BEHIND],
-        passes=tuple(sockets[name] for name in names),
+        disk_pass=sockets[PASS],
         colours=sockets[COLOURS],
         texture=sockets[TEXTURE],
         phase=sockets[PHASE],

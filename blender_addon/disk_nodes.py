@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is inside the node group "Umbra Disk": from a map's disk passes to a premultiplied picture, in float32.
+"""What is inside the node groups "Umbra Disk": from a map's disk passes to a premultiplied picture, in float32.
 
 The same picture as `physics.disk_render` in float64, term by term, with a table of the colours of black bodies over the
 temperature (see `disk_images`).
@@ -8,6 +8,7 @@ temperature (see `disk_images`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ._physics import disk_look, reference_render
@@ -24,8 +25,7 @@ _LOWEST, _HIGHEST = math.log(disk_look.COLDEST), math.log(disk_look.HOTTEST)
 class DiskInputs:
     """Output sockets of the Group Input node; what they mean is said where they are declared, in `disk_group`."""
 
-    behind: Socket
-    passes: tuple[Socket, ...]
+    disk_pass: Socket
     colours: Socket
     texture: Socket
     phase: Socket
@@ -83,45 +83,52 @@ class _FluxTerms:
     weights: tuple[Socket, Socket, Socket]
 
 
-def build(builder: TreeBuilder, inputs: DiskInputs, *, picture: bool) -> tuple[Socket, Socket]:
-    """Add all nodes between the group's inputs and its outputs, the disk alone and in front of what is behind.
+def build_image(
+    builder: TreeBuilder, inputs: DiskInputs, light: Socket, through: Socket, *, picture: bool
+) -> tuple[Socket, Socket]:
+    """Add all nodes that draw one image of the disk behind those in front of it.
 
-    Both are of the render's size, premultiplied. A pass that is missing makes all of the picture magenta. With
-    `picture`, the texture's colours are the disk's, and its alpha is the density.
+    Taken and returned are the light of the disk so far and the share of what is behind that is left. With `picture`,
+    the texture's colours are the disk's, and its alpha is the density.
     """
     with builder.frame("Once for all pixels"):
         shared = _share(builder, inputs)
-    light: Value | None = None
-    through: Value = 1.0
-    for number, one in enumerate(inputs.passes, start=1):
-        with builder.frame(f"Image {number}: place"):
-            radius, phi, g, coverage = builder.separate_colour(one)
-            depth = _depth(builder, inputs, shared, radius)
-        with builder.frame(f"Image {number}: streaks and clumps"):
-            place = radius, phi, depth
-            if picture:
-                tint, full = _moving_picture(builder, inputs, shared, place)
-                full = builder.math("MULTIPLY", full, _fade(builder, inputs, depth))
-            else:
-                streaks, clumps = _moving_texture(builder, inputs, shared, place, coverage)
-                thick = _density(builder, inputs, depth, streaks, clumps)
-                full = builder.math("MINIMUM", 1.0, builder.math("MULTIPLY", thick, disk_look.OPACITY_REACH))
-        with builder.frame(f"Image {number}: light"):
-            if picture:
-                colour = _tinted_light(builder, inputs, shared, radius, g, tint)
-            else:
-                colour = _emission(builder, inputs, shared, radius, g)
-                colour = builder.vector_scale(
-                    colour, builder.math("POWER", thick, builder.math("SUBTRACT", inputs.gain, 1.0))
-                )
-        with builder.frame(f"Image {number}: in front of what is behind"):
-            alpha = builder.math("MULTIPLY", builder.math("MULTIPLY", full, inputs.opacity), coverage)
-            share = builder.math("MULTIPLY", alpha, through)
-            seen = builder.vector_scale(colour, share)
-            light = seen if light is None else builder.vector_math("ADD", light, seen)
-            through = builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, alpha), through)
+    with builder.frame("Place"):
+        radius, phi, g, coverage = builder.separate_colour(inputs.disk_pass)
+        depth = _depth(builder, inputs, shared, radius)
+    with builder.frame("Streaks and clumps"):
+        place = radius, phi, depth
+        if picture:
+            tint, full = _moving_picture(builder, inputs, shared, place)
+            full = builder.math("MULTIPLY", full, _fade(builder, inputs, depth))
+        else:
+            streaks, clumps = _moving_texture(builder, inputs, shared, place, coverage)
+            thick = _density(builder, inputs, depth, streaks, clumps)
+            full = builder.math("MINIMUM", 1.0, builder.math("MULTIPLY", thick, disk_look.OPACITY_REACH))
+    with builder.frame("Light"):
+        if picture:
+            colour = _tinted_light(builder, inputs, shared, radius, g, tint)
+        else:
+            colour = _emission(builder, inputs, shared, radius, g)
+            dense = builder.math("POWER", thick, builder.math("SUBTRACT", inputs.gain, 1.0))
+            colour = builder.vector_scale(colour, dense)
+    with builder.frame("In front of what is behind"):
+        alpha = builder.math("MULTIPLY", builder.math("MULTIPLY", full, inputs.opacity), coverage)
+        share = builder.math("MULTIPLY", alpha, through)
+        light = builder.vector_math("ADD", builder.vector_scale(colour, share), light)
+        return light, builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, alpha), through)
+
+
+def build_whole(
+    builder: TreeBuilder, passes: Sequence[Socket], behind: Socket, light: Socket, through: Socket
+) -> tuple[Socket, Socket]:
+    """Add the nodes that make pictures of the render's size from the light of all images and what they leave.
+
+    Returned are the disk alone and in front of what is behind, premultiplied. A pass that is missing makes all of the
+    picture magenta.
+    """
     with builder.frame("Are all passes there?"):
-        whole = _all_there(builder, inputs)
+        whole = _all_there(builder, passes)
     with builder.frame("To the render's size"):
         covered = builder.math("SUBTRACT", 1.0, through)
         light, alphas = to_render_size(builder, light, builder.combine(covered, covered, covered))
@@ -135,8 +142,8 @@ def build(builder: TreeBuilder, inputs: DiskInputs, *, picture: bool) -> tuple[S
     with builder.frame("Over what is behind"):
         left = builder.math("SUBTRACT", 1.0, alpha)
         channels = (
-            builder.math("MULTIPLY_ADD", behind, left, front)
-            for behind, front in zip(builder.separate_colour(inputs.behind), (red, green, blue, alpha), strict=True)
+            builder.math("MULTIPLY_ADD", back, left, front)
+            for back, front in zip(builder.separate_colour(behind), (red, green, blue, alpha), strict=True)
         )
         return disk, builder.combine_colour(*channels)
 
@@ -345,10 +352,10 @@ def _brightness(
     return builder.math("MULTIPLY", builder.math("MULTIPLY", brightness, beamed), shared.brightness)
 
 
-def _all_there(builder: TreeBuilder, inputs: DiskInputs) -> Socket:
+def _all_there(builder: TreeBuilder, passes: Sequence[Socket]) -> Socket:
     """1 if each pass is a picture, else 0; a file that is missing has no size."""
     there: Socket | None = None
-    for one in inputs.passes:
+    for one in passes:
         width, _ = builder.image_size(one)
         one_there = builder.math("GREATER_THAN", width, 0.5)
         there = one_there if there is None else builder.math("MULTIPLY", there, one_there)

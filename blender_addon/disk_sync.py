@@ -132,7 +132,7 @@ def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.N
     """The node of the disk's group in a tree, with the nodes of its pictures; not linked to anything else."""
     settings = shot.active_hole(scene).umbra.disk
     images = int(settings.crossings)
-    group = disk_group.group_of(images, disk_properties.shows_picture(settings)).ensure()
+    group = disk_group.ensure(images, disk_properties.shows_picture(settings))
     node = find_node(tree, DISK)
     if node is None:
         node = tree.nodes.new("CompositorNodeGroup")
@@ -154,8 +154,7 @@ def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.N
                 tree.links.new(node.outputs[name], socket)
         if picture is not None:
             tree.links.new(picture, node.inputs[disk_group.BEHIND])
-        if former is not None and former.users == 0 and disk_group.owns(former):
-            bpy.data.node_groups.remove(former)
+        disk_group.remove_unused()
     node.name = node.label = disk_group.GROUP_NAME
     roles = (*(pass_role(number) for number in range(1, images + 1)), *TABLE_ROLES.values())
     for role, name in zip(roles, (*disk_group.pass_names(images), *TABLE_ROLES), strict=True):
@@ -183,10 +182,8 @@ def remove(tree: bpy.types.NodeTree) -> None:
     node = find_node(tree, DISK)
     if node is not None:
         _remove_drivers(tree, node.path_from_id() + ".")
-        used = node.node_tree
         tree.nodes.remove(node)
-        if used is not None and used.users == 0:
-            bpy.data.node_groups.remove(used)
+        disk_group.remove_unused()
     passes = (pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1))
     for role in (*passes, *TABLE_ROLES.values(), *FORMER_ROLES):
         _remove_node(tree, role)

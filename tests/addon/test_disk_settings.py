@@ -172,17 +172,19 @@ def test_removing_the_set_up_removes_the_disk_and_a_new_one_brings_it_back(
 def test_a_damaged_group_is_rebuilt_when_the_file_is_opened(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    group = addon_module("disk_group").group_of(3)
-    tree = group.find()
-    tree[group.version_key] = 0
-    for node in list(tree.nodes)[::3]:
-        tree.nodes.remove(node)
+    groups = [addon_module("disk_group").group_of(3), addon_module("disk_group").image_group(False)]
+    for group in groups:
+        tree = group.find()
+        tree[group.version_key] = 0
+        for node in list(tree.nodes)[::3]:
+            tree.nodes.remove(node)
     hole.umbra.disk["temperature"] = 5123.0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    tree = addon_module("disk_group").group_of(3).find()
-    assert group.is_current(tree)
-    assert all(link.is_valid for link in tree.links)
+    for group in groups:
+        tree = group.find()
+        assert group.is_current(tree)
+        assert all(link.is_valid for link in tree.links)
 
 
 def test_a_missing_pass_is_magenta(
@@ -294,8 +296,9 @@ def test_light_follows_keyframes(
     lit = [exr.read_exr(tmp_path / f"lit_{frame:04d}.exr")[0][..., :3].sum() for frame in (1, 2, 3)]
     assert lit[0] > 1.0
     # Blender's eased curve is half-way at frame 2: one stop, and three quarters.
-    assert lit[1] / lit[0] == pytest.approx(1.5, rel=1e-3)
-    assert lit[2] / lit[0] == pytest.approx(2.0, rel=1e-3)
+    # Cycles picks the same faces with other shares of the light: a percent with so few samples.
+    assert lit[1] / lit[0] == pytest.approx(1.5, rel=0.03)
+    assert lit[2] / lit[0] == pytest.approx(2.0, rel=0.03)
     light = addon_module("disk_light").find(hole)
     scene.frame_set(1)
     brightest = max(each.color[0] for each in light.data.attributes["Light"].data)
