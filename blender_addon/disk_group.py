@@ -7,8 +7,8 @@ Non-Color and Channel Packed like the warp map; Colours is a table, and Texture 
 ln(radius) down, see `disk_images`.
 
 A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
-images, and for each way to use the texture; a file has those that it needs. Inside is "Umbra Disk Image", another group,
-for each of the images.
+images, and for each way to use the texture; a file has those that it needs. Inside, each image is drawn by another
+group, "Umbra Disk Image".
 """
 
 from __future__ import annotations

@@ -187,6 +187,32 @@ def test_a_damaged_group_is_rebuilt_when_the_file_is_opened(
         assert all(link.is_valid for link in tree.links)
 
 
+def test_the_first_versions_group_gives_way_to_the_one_that_fits(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """A file as version 1 left it: one group for all disks, sockets in another order, and a table of the profile."""
+    setup = addon_module("compositor_tree").find_setup(scene)
+    node = addon_module("compositor_tree").find_node(setup.tree, "disk")
+    former = bpy.data.node_groups.new("Umbra Disk", "CompositorNodeTree")
+    former["umbra_disk_version"] = 1
+    former.interface.new_socket("Disk", in_out="OUTPUT", socket_type="NodeSocketColor")
+    for name in ("Pass 1", "Pass 2", "Pass 3", "Profile", "Colours", "Texture"):
+        former.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketColor")
+    former.interface.new_socket("Pattern Phase", in_out="INPUT", socket_type="NodeSocketFloat")
+    wanted = links_of(setup.tree), [curve.data_path for curve in setup.tree.animation_data.drivers]
+    node.node_tree = former
+    table = setup.tree.nodes.new("CompositorNodeImage")
+    table["umbra_role"] = "disk_profile"
+    table.image = bpy.data.images.new("Umbra Disk Profile (Black Hole)", 1, 16)
+    setup.tree.links.new(table.outputs["Image"], node.inputs["Profile"])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    tree = addon_module("compositor_tree").find_setup(bpy.context.scene).tree
+    assert (links_of(tree), [curve.data_path for curve in tree.animation_data.drivers]) == wanted
+    assert "Umbra Disk" not in bpy.data.node_groups
+    assert not any(image.name.startswith("Umbra Disk Profile") for image in bpy.data.images)
+
+
 def test_a_missing_pass_is_magenta(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
