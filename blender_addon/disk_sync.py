@@ -31,10 +31,15 @@ def refresh_hole(hole: bpy.types.Object) -> None:
     """Carry a change of a hole's settings into all scenes that render it."""
     for scene in bpy.data.scenes:
         if isinstance(hole, bpy.types.Object) and shot.find_active_hole(scene) == hole:
-            try:
-                refresh(scene)
-            except SceneError as error:
-                messages.warn(str(error))
+            refresh_or_warn(scene)
+
+
+def refresh_or_warn(scene: bpy.types.Scene) -> None:
+    """The same as `refresh` where nobody could be told by an error."""
+    try:
+        refresh(scene)
+    except SceneError as error:
+        messages.warn(str(error))
 
 
 def refresh(scene: bpy.types.Scene) -> None:

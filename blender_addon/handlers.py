@@ -142,7 +142,9 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     baking.forget_shared_rays()
     if scene.name in _rendering:
         _rendering.discard(scene.name)
-        _waiting.discard(scene.name)
+        if scene.name in _waiting:  # cancelled half-way
+            _waiting.discard(scene.name)
+            lens_disk.point_at_passes(scene)
         lens_render.end(scene)
         return
     if scene.name in _waiting:  # cancelled half-way

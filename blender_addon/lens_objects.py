@@ -75,8 +75,8 @@ def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot
     sentences = []
     if frame.parameters.disk is not None and not lens_disk.is_in_use(scene):
         sentences.append(
-            f'The disk of "{frame.hole_name}" is not drawn: the compositor is switched off, or does not use the node '
-            "Umbra Disk. Choose Output: Cycles Lens again, or connect the node's Image."
+            f'The disk of "{frame.hole_name}" is not drawn: switch Compositing on in Output Properties, and connect '
+            "the Image of the node Umbra Disk in the Compositor."
         )
     if found.inside:
         radius = scene.umbra.sphere_radius

@@ -35,7 +35,6 @@ def end(scene: bpy.types.Scene) -> None:
     if device is not None:
         scene.cycles.device = device
     lens_sync.show_live(scene)
-    lens_disk.point_at_passes(scene)
 
 
 def take_away(scene: bpy.types.Scene) -> None:

@@ -168,6 +168,9 @@ def test_switching_leaves_no_trace(scene, addon_module, own_tree) -> None:
     without = state_of(scene, find_tree(scene))
     hole = add_hole(scene)
     assert in_use(scene)
+    scene.umbra.supersampling = "2"
+    passes = addon_module("disk_sync").passes_of(find_tree(scene))
+    assert all("_192x108_" in node.image.filepath for node, _ in passes)
     hole.umbra.disk.enabled = False
     assert state_of(scene, find_tree(scene)) == without
     hole.umbra.disk.enabled = True
