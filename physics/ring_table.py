@@ -18,16 +18,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .crossings import cross_plane
 from .observer import Observer
 from .rays import Array, rays_from_triad
-from .sky_table import AROUND, AROUND_ERROR, lagrange_weights, position_angles
+from .sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
 from .sphere import cos_sin
 from .trapped import around_hole, edge_angles
 
+Mask = NDArray[np.bool_]
+
 # The step of asinh(delta / w), and the fewest and most position angles of the grid.
-STEP = 0.3
+STEP = 0.25
 ANGLES = (96, 512)
 # How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
 REACH = (0.7, 1.5)
@@ -86,25 +89,30 @@ class _Coordinates:
 class RingTable:
     """Where rays around the shadow's edge cross the plane for the k-th time, for one camera's place."""
 
-    def __init__(self, coordinates: _Coordinates, channels: list[Array]) -> None:
+    def __init__(self, coordinates: _Coordinates, channels: list[Array], good: Mask, needs: Needs) -> None:
         """`channels`: u, unwound azimuth and du / dlambda, shape (angles + 3, columns), at all but the outermost s and
-        at the angles from the one before the first to the second after the last."""
+        at the angles from the one before the first to the second after the last; `good`: where all of them are known,
+        elsewhere only that they are off the disk."""
         self._angles = len(coordinates.edge)
         around = np.arange(AROUND[0], self._angles + AROUND[-1]) % self._angles
         self._edge, self._scale = coordinates.edge[around], coordinates.scale[around]
         self._step = (coordinates.range * (coordinates.s[1] - coordinates.s[0]))[around]
         self._first = 2.0 + coordinates.s[0] / (coordinates.s[1] - coordinates.s[0])
-        self._columns = channels[0].shape[1]
+        self._columns = int(channels[0].shape[1])
         self._channels = [np.ascontiguousarray(each).ravel() for each in channels]
+        self._rims = 1.0 / needs.outer, 1.0 / needs.inner
+        reach = len(AROUND)
+        cells = np.lib.stride_tricks.sliding_window_view(good, (reach, reach))
+        self._good = np.ascontiguousarray(cells.all(axis=(2, 3))).ravel()
 
     @property
     def rays(self) -> int:
         """How many rays it was made of, but for those that told the scale."""
         return self._angles * (self._columns + 2)
 
-    def places(self, light: Array, channels: int) -> Array:
-        """Return the first few channels for light, shape (3, n) as for `SkyTable.directions`; NaN: no answer."""
-        away, row, part = position_angles(light, self._angles)
+    def places(self, away: Array, angle: Array, channels: int) -> Array:
+        """Return the first few channels at `position_angles`, shape (channels, n); NaN: no answer."""
+        row, part = angle_steps(angle, self._angles)
         across = lagrange_weights(part, AROUND)
         edge, scale, step = (
             sum(weight * each.take(row + i) for i, weight in enumerate(across))
@@ -122,7 +130,10 @@ class RingTable:
                 both, index = weight * other, first + j
                 for component, values in zip(result, self._channels[:channels], strict=True):
                     component += both * values.take(index)
-        result[:, ~inside] = np.nan
+        low, high = self._rims
+        unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
+        unknown &= (result[0] >= low) & (result[0] <= high)
+        result[:, unknown | ~inside] = np.nan
         return result
 
 
@@ -164,7 +175,7 @@ def ring_tables(spin: float, observer: Observer, rays: dict[int, float], needs: 
         s = s[s > -(inside / outside).min()]
         grid = _Coordinates(here, scale, np.arcsinh(REACH[1] * here / scale), s)
         values = cross(here[:, None] + grid.delta, aside, up, [order])[:, 0]
-        tables[order] = RingTable(grid, _served(values, grid, needs))
+        tables[order] = RingTable(grid, *_served(values, grid, needs), needs)
     return tables
 
 
@@ -173,8 +184,9 @@ def _scale(u: Array, edge: Array, needs: Needs) -> Array:
     half = len(SHARES)
     inside, outside = u[:, :half][:, ::-1], u[:, half:]  # from the edge away
     change = np.fmax(np.abs(inside - inside[:, :1]), np.abs(outside - outside[:, :1]))
-    first = (np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner).argmax(axis=1)
-    scale: Array = SHARES[::-1][first] * edge
+    changed = np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner
+    changed[:, -1] = True  # where nothing crowds, the largest will do
+    scale: Array = SHARES[::-1][changed.argmax(axis=1)] * edge
     return scale
 
 
@@ -186,8 +198,8 @@ def _between(scale: Array, angles: int) -> Array:
     return smooth
 
 
-def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
-    """Return the channels for `RingTable`, NaN around which interpolation is not good enough."""
+def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array], Mask]:
+    """Return the channels for `RingTable`, NaN where nothing is known well enough, and where all of them are."""
     u, azimuth, slope = values
     angles = len(u)
     azimuth = np.nan_to_num(azimuth)  # rays that never cross: their u is not known either
@@ -205,6 +217,13 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
     step = grid.range * (grid.s[1] - grid.s[0])
     along = needs.pixel / (step[wide, None] * np.hypot(grid.scale[wide, None], grid.delta[wide]))
     across = needs.pixel * angles / (2.0 * math.pi * np.maximum(np.sin(away), needs.pixel))
+    # What the coordinates lose between angles, in steps of s.
+    lost_edge, lost_scale, lost_step = (
+        AROUND_ERROR * np.abs(np.diff(each[np.arange(-4, angles + 5) % angles], 4))[:, None]
+        for each in (grid.edge, grid.scale, step)
+    )
+    stray = along / needs.pixel * (lost_edge + lost_scale * np.abs(np.sinh(grid.range[wide, None] * grid.s)))
+    stray += lost_step / step[wide, None] * np.abs(grid.s / (grid.s[1] - grid.s[0]))
     good = np.ones(u.shape, dtype=bool)
     for each, small in ((u, needs.place_error / needs.outer), (azimuth, needs.place_error)):
         error = np.zeros_like(each)
@@ -213,9 +232,10 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
             padded = np.pad(left_out, [(2, 2) if i == axis else (0, 0) for i in (0, 1)], mode="edge")
             error = np.maximum(error, padded)
         change = np.gradient(each, axis=1), np.gradient(each, axis=0)
+        error += stray * np.abs(change[0])
         good &= error < np.maximum(needs.pixel_error * np.hypot(change[0] * along, change[1] * across), small)
         if each is u:
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
-    good |= far
-    return [np.where(good, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)]
+    known = good | far
+    return [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)], good[1:-1, 1:-1]

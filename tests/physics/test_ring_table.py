@@ -10,12 +10,13 @@ from shots import shot
 
 from physics import Disk, Observer, bake
 from physics.crossings import cross_plane
-from physics.disk_painting import PIXEL_ERROR, PLACE_ERROR
+from physics.disk_samples import PIXEL_ERROR, PLACE_ERROR
 from physics.mino import radial_polynomial
 from physics.polar import PolarMotion
 from physics.radial_path import winding
 from physics.rays import rays_from_triad
 from physics.ring_table import Needs, ring_tables
+from physics.sky_table import position_angles
 from physics.sphere import unit_vectors
 from physics.view import View
 
@@ -25,6 +26,7 @@ CAMERAS = {
     "extreme spin close up": {"spin": 0.999, "radius": 10.0, "fov": 60.0},
     "over the pole": {"spin": 0.7, "radius": 20.0, "inclination": 25.0},
     "without spin": {"spin": 0.0, "radius": 15.0, "inclination": 70.0},
+    "from within the plane": {"spin": 0.7, "radius": 20.0, "fov": 70.0, "inclination": 90.0},
     "the other way round": {"spin": -0.8, "radius": 25.0},
 }
 
@@ -59,7 +61,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
     tables = tables_of(parameters)
     assert set(tables) == {1, 2}
     for order, table in tables.items():
-        u, azimuth = table.places(view.light(x, y), 2)
+        u, azimuth = table.places(*position_angles(view.light(x, y)), 2)
         known = np.isfinite(u)
         exact = traced.u[order]
         on_disk = (exact > 1.0 / outer) & (exact < 1.0 / inner)
@@ -83,7 +85,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
 def test_tables_save_rays_and_leave_the_picture_as_it_is(monkeypatch):
     parameters = dataclasses.replace(shot(960, 540, spin=0.9, radius=20.0, fov=40.0), disk=Disk())
     with_tables = bake(parameters)
-    monkeypatch.setattr("physics.disk_painting.WORTHWHILE_RAYS", math.inf)
+    monkeypatch.setattr("physics.disk_samples.WORTHWHILE_RAYS", math.inf)
     without = bake(parameters)
     assert with_tables.counts["disk_rays"] < 0.8 * without.counts["disk_rays"]
     for one, other in zip(with_tables.disk_passes, without.disk_passes, strict=True):
