@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .checks import shown
 from .errors import BlackHoleError
 from .metric import check_spin, isco_radius
 from .rays import Array
@@ -105,8 +106,10 @@ def relative_flux(
         For a profile that there is not.
     """
     r = np.asarray(radius, dtype=np.float64)
+    if not isinstance(profile, str):
+        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
     if profile == "power_law":
         return np.minimum(inner / r, 1.0) ** exponent
     if profile != "novikov_thorne":
-        raise BlackHoleError(f"There is no temperature profile '{profile}'; choose one of {', '.join(PROFILES)}.")
+        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
     return page_thorne_flux(spin, r, retrograde) / peak_flux(spin, retrograde)
