@@ -224,6 +224,8 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     path = baking.path_of(scene, frame_shot)
     baking.provide_map(scene, path, baking.parameters_of(scene, frame_shot), frame_shot.frame)
     if world_sync.is_on(scene):
+        for warning in world_sync.warnings(frame_shot):
+            messages.warn(warning)
         world_sync.check_resolved(maps.WORLD_MAP.format.read_metadata(path), frame_shot)
         world_sync.point_at_files(scene)
         world_sync.forget_loaded_map(scene)

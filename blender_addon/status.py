@@ -77,7 +77,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     if lensed:
         found += _lens_lines(scene, depsgraph, now)
     elif world_sync.is_on(scene):
-        found += _world_lines(scene)
+        found += _world_lines(scene, now)
     elif find_setup(scene) is None:
         found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
     for path, parameters in baking.maps_of(scene, now):
@@ -101,7 +101,7 @@ def _lens_lines(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, now: sho
     return found
 
 
-def _world_lines(scene: bpy.types.Scene) -> list[Line]:
+def _world_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
     found: list[Line] = []
     try:
         world_sync.check(scene)
@@ -109,6 +109,8 @@ def _world_lines(scene: bpy.types.Scene) -> list[Line]:
         found += wrapped(str(error), "ERROR")
     if scene.render.film_transparent:
         found += wrapped("Film > Transparent is on: the camera does not see the World.", "ERROR")
+    for warning in world_sync.warnings(now):
+        found += wrapped(warning, "ERROR")
     return found
 
 

@@ -260,3 +260,10 @@ def check_resolved(metadata: dict, frame_shot: shot.Shot) -> None:
             f"Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "
             f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
         )
+
+
+def warnings(frame_shot: shot.Shot) -> list[str]:
+    """What a render of a frame leaves out, in sentences."""
+    if frame_shot.parameters.disk is None:
+        return []
+    return [f'The disk of "{frame_shot.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.']

@@ -357,3 +357,15 @@ def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
     (path,) = Path(scene.umbra.map_folder).glob("*.exr")
     assert modules("cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
     assert modules("maps").kind_of(path).noun == "world map"
+
+
+def test_a_disk_that_is_not_drawn_is_named(
+    scene: bpy.types.Scene, tmp_path: Path, physics: ModuleType, modules: Callable, capfd: pytest.CaptureFixture[str]
+) -> None:
+    switch()
+    scene.umbra.active_hole.umbra.disk.enabled = True
+    lines = modules("status").lines(bpy.context)
+    assert "is not drawn by Output: World" in " ".join(line.text for line in lines)
+    render(scene, tmp_path / "picture.exr", physics.exr)
+    output = capfd.readouterr()
+    assert 'The disk of "Hole" is not drawn by Output: World' in output.out + output.err
