@@ -110,6 +110,13 @@ def _public_name(
     )
 
 
+def _plain_stars(
+    _app: Sphinx, _what: str, _name: str, _object: object, _options: object, lines: list[str]
+) -> None:
+    """Have a shape like (*shape, 3) printed, where reStructuredText would begin emphasis."""
+    lines[:] = [re.sub(r"\(\*(?=\w)", r"(\\*", line) for line in lines]
+
+
 def _draw_figures(_app: Sphinx) -> None:
     figures.draw_all(DOCS / "generated")
 
@@ -118,4 +125,5 @@ def setup(app: Sphinx) -> None:
     """Connect this project's own steps to the build."""
     app.connect("builder-inited", _draw_figures)
     app.connect("source-read", _read_page)
+    app.connect("autodoc-process-docstring", _plain_stars)
     app.connect("missing-reference", _public_name)
