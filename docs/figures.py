@@ -173,10 +173,10 @@ def schwarzschild_deflection(b: np.ndarray) -> np.ndarray:
 def traced_deflection(spin: float, b: np.ndarray) -> np.ndarray:
     """By how much light of these impact parameters, all of one sign and growing outwards, is bent, radians."""
     looking = _looking(spin, b, FAR)
-    seen = trace_rays(spin, Observer.fido(FAR, 0.5 * math.pi, 0.0), 0.5 * math.pi, looking)
+    observer = Observer.fido(FAR, 0.5 * math.pi, 0.0)
+    seen = trace_rays(spin, observer, 0.5 * math.pi, looking, tolerance=1e-10)
     bent = np.sign(b) * (looking - seen.phi)
-    from_outside = np.unwrap((bent % (2.0 * math.pi))[::-1])[::-1]
-    return from_outside
+    return np.unwrap((bent % (2.0 * math.pi))[::-1])[::-1]  # from the outermost, which is bent by less than a turn
 
 
 def deflection() -> Figure:

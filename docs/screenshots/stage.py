@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Set up each screenshot inside Blender for `take.py`, which starts this and takes them off the display.
 
-Each picture is a generator: what it yields are seconds for Blender to draw, what it returns says where to cut. Nothing is drawn that an artist would not see; panels that are not meant are only left out.
+Each picture is a generator: what it yields are seconds for Blender to draw, what it returns says where to cut. Nothing
+is drawn that an artist would not see; panels that are not meant are only left out.
 """
 
 import json
@@ -15,6 +16,8 @@ import bpy
 FOLDER = Path.cwd()
 SETTLE = 1.0  # seconds for the window to be drawn, in software
 WAIT = 0.1
+BAKED = 0.25
+"""Share of an animation's frames that are baked when the picture of it is taken."""
 PERCENTAGE = 40
 """Of the renders' full HD."""
 WIDER = 90
@@ -132,13 +135,16 @@ def choose_tab() -> Generator[float, None, None]:
 def add_menu() -> Steps:
     """The Add menu with the black hole's entry under the pointer."""
     here = region("WINDOW", area())
-    point(here.x + 300, here.y + here.height - 150)
+    point(here.x + 400, here.y + here.height - 150)
     yield SETTLE
     with at():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_add")
     yield SETTLE
+    for value in ("PRESS", "RELEASE"):  # the last entry
+        window().event_simulate("END", value)
+    yield SETTLE
     left, top, _width, _height = rectangle(here)
-    return (left + 180, top + 60, 420, 520), False
+    return (left + 240, top + 30, 420, 640), False
 
 
 def panel() -> Steps:
@@ -177,11 +183,14 @@ def baking() -> Steps:
     scene = bpy.context.scene
     scene_with_hole()
     scene.render.resolution_percentage = 60
+    scene.frame_end = 24
     show_panels()
     yield from choose_tab()
     with at():
         bpy.ops.umbra.bake_animation("INVOKE_DEFAULT")
-    yield 6.0
+    operators = sys.modules[f"{PACKAGE}.operators"]
+    while operators.running.fraction < BAKED:
+        yield WAIT
     return sidebar_rectangle(), True
 
 
@@ -191,6 +200,7 @@ def stop_baking() -> Generator[float, None, None]:
         bpy.ops.umbra.stop_baking()
     yield SETTLE
     bpy.context.scene.render.resolution_percentage = PERCENTAGE
+    bpy.context.scene.frame_end = 250
 
 
 def error() -> Steps:
@@ -210,7 +220,7 @@ def popup() -> Steps:
     yield SETTLE
     with at():
         bpy.ops.render.render()
-    yield 2.0 * SETTLE
+    yield 3.0 * SETTLE  # the message comes when Blender is free again
     left, top, _width, height = rectangle(here)
     return (left + 100, top + height // 2 - 120, 800, 240), True
 
@@ -312,6 +322,8 @@ def take_all(names: list[str]) -> Generator[float, None, None]:
     for name in names:
         picture, afterwards = PICTURES[name]
         crop, trim = yield from picture()
+        with bpy.context.temp_override(window=window()):
+            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
         request = FOLDER / f"{name}.request"
         request.with_suffix(".part").write_text(json.dumps({"crop": crop, "trim": trim}))
         request.with_suffix(".part").rename(request)
@@ -336,7 +348,7 @@ def main() -> None:
             return next(steps)
         except StopIteration:
             pass
-        except Exception:
+        except Exception:  # noqa: BLE001  whatever it is: Blender has to end, and its output shows it
             traceback.print_exc()
         bpy.ops.wm.quit_blender()
         return None

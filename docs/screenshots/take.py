@@ -81,8 +81,8 @@ def run_blender(executable: str, folder: Path, names: list[str]) -> None:
     subprocess.run([executable, *install], cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
     stage = shutil.copy(HERE / "stage.py", folder)
     display, environment["DISPLAY"] = start_display()
-    window = ["--window-geometry", "0", "0", *map(str, WINDOW)]
-    command = [executable, *window, "--enable-event-simulate", "--python-exit-code", "1", "--python", stage, "--", *names]
+    window = ["--window-geometry", "0", "0", *map(str, WINDOW), "--enable-event-simulate"]
+    command = [executable, *window, "--python-exit-code", "1", "--python", stage, "--", *names]
     try:
         with (folder / "blender.log").open("w") as log:
             blender = subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log)

@@ -56,7 +56,7 @@ def _template(node: ast.expr | None) -> str:
 
 
 def _spoken(node: ast.AST, speaks: bool) -> Iterator[ast.expr]:
-    """String literals below a node that a user may read: in errors, in reports, and wherever they end as sentences do."""
+    """String literals that a user may read: in errors and reports, and wherever they end as sentences do."""
     if isinstance(node, ast.Constant | ast.JoinedStr):
         text = _template(node)
         if speaks or text.rstrip().endswith("."):
