@@ -16,6 +16,7 @@ import bpy
 FOLDER = Path.cwd()
 SETTLE = 1.0  # seconds for the window to be drawn, in software
 WAIT = 0.1
+ATTEMPTS = 5
 BAKED = 0.25
 """Share of an animation's frames that are baked when the picture of it is taken."""
 PERCENTAGE = 40
@@ -27,7 +28,9 @@ TABS = 26
 """Pixels of the sidebar's tabs, which run down its whole height."""
 PACKAGE = "bl_ext.user_default.umbra_black_hole"
 
-Steps = Generator[float, None, tuple[tuple[int, int, int, int], bool]]
+Rectangle = tuple[int, int, int, int]
+Steps = Generator[float, None, tuple[Rectangle, bool]]
+Shooting = Generator[float, None, bool]
 
 
 def window() -> bpy.types.Window:
@@ -51,7 +54,7 @@ def at(kind: str = "VIEW_3D", part: str = "WINDOW") -> object:
     return bpy.context.temp_override(window=window(), area=here, region=region(part, here))
 
 
-def rectangle(thing: bpy.types.Area | bpy.types.Region, header: int = 0) -> tuple[int, int, int, int]:
+def rectangle(thing: bpy.types.Area | bpy.types.Region, header: int = 0) -> Rectangle:
     """Left, top, width and height of a part of the window, from its upper left corner."""
     return thing.x, window().height - thing.y - thing.height - header, thing.width, thing.height + header
 
@@ -119,7 +122,7 @@ def sidebar(*names: str) -> Steps:
     return sidebar_rectangle(), True
 
 
-def sidebar_rectangle() -> tuple[int, int, int, int]:
+def sidebar_rectangle() -> Rectangle:
     """The sidebar without its tabs."""
     left, top, width, height = rectangle(region("UI", area()))
     return left + BORDER, top + BORDER, width - TABS - 2 * BORDER, height - 2 * BORDER
@@ -216,13 +219,19 @@ def popup() -> Steps:
     scene_with_hole()
     bpy.context.scene.camera.data.type = "ORTHO"
     here = region("WINDOW", area())
-    point(here.x + 500, here.y + here.height // 2)
-    yield SETTLE
-    with at():
-        bpy.ops.render.render()
-    yield 3.0 * SETTLE  # the message comes when Blender is free again
     left, top, _width, height = rectangle(here)
-    return (left + 100, top + height // 2 - 120, 800, 240), True
+    crop = (left + 90, top + height // 2 - 60, 540, 120)
+    yield SETTLE
+    yield from shoot("before", crop, keep=False)
+    for _ in range(ATTEMPTS):  # on a slow machine a message is closed by events that come late
+        point(here.x + 500, here.y + here.height // 2)
+        yield SETTLE
+        with at():
+            bpy.ops.render.render()
+        yield 3.0 * SETTLE  # the message comes when Blender is free again
+        if (yield from shoot("tried", crop, unlike="before", keep=False)):
+            break
+    return crop, False
 
 
 def perspective() -> Generator[float, None, None]:
@@ -316,19 +325,25 @@ def prepare() -> Generator[float, None, None]:
     yield SETTLE
 
 
+def shoot(name: str, crop: Rectangle, trim: bool = False, *, unlike: str = "", keep: bool = True) -> Shooting:
+    """Have the window taken off the display; return whether the picture is unlike an earlier one."""
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+    request = FOLDER / f"{name}.request"
+    request.with_suffix(".part").write_text(json.dumps({"crop": crop, "trim": trim, "unlike": unlike, "keep": keep}))
+    request.with_suffix(".part").rename(request)
+    while request.exists():
+        yield WAIT
+    return request.with_suffix(".png").exists()
+
+
 def take_all(names: list[str]) -> Generator[float, None, None]:
     """Take one picture after the other."""
     yield from prepare()
     for name in names:
         picture, afterwards = PICTURES[name]
         crop, trim = yield from picture()
-        with bpy.context.temp_override(window=window()):
-            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-        request = FOLDER / f"{name}.request"
-        request.with_suffix(".part").write_text(json.dumps({"crop": crop, "trim": trim}))
-        request.with_suffix(".part").rename(request)
-        while request.exists():  # until the picture is taken
-            yield WAIT
+        yield from shoot(name, crop, trim)
         if afterwards is not None:
             yield from afterwards()
     show_panels(*(each.__name__.removeprefix("VIEW3D_PT_umbra_") for each in PANELS))  # as the add-on registered them

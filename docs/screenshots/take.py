@@ -52,21 +52,24 @@ def take(request: Path, environment: dict[str, str]) -> None:
     """Take the picture that Blender asks for, cut to what matters, small."""
     wanted = json.loads(request.read_text())
     left, top, width, height = wanted["crop"]
-    path = HERE / f"{request.stem}.png"
-    whole = request.with_suffix(".png")
+    whole, cut = request.with_suffix(".whole.png"), request.with_suffix(".png")
     subprocess.run(["import", "-window", "root", str(whole)], env=environment, check=True)
     command = ["convert", str(whole), "-crop", f"{width}x{height}+{left}+{top}", "+repage"]
     if wanted["trim"]:
         command += ["-fuzz", "1%", "-trim", "+repage", "-bordercolor", "#303030", "-border", "4"]
     for colours in COLOURS:
         written = [*command, "-strip", "+dither", "-colors", str(colours), "-define", "png:compression-level=9"]
-        subprocess.run([*written, f"PNG8:{path}"], check=True)
-        if path.stat().st_size <= LARGEST:
+        subprocess.run([*written, f"PNG8:{cut}"], check=True)
+        if cut.stat().st_size <= LARGEST:
             break
     else:
-        sys.exit(f"{path.name} has more than {LARGEST} bytes: cut it smaller.")
+        sys.exit(f"{cut.name} has more than {LARGEST} bytes: cut it smaller.")
+    if wanted["unlike"] and cut.read_bytes() == request.with_name(f"{wanted['unlike']}.png").read_bytes():
+        cut.unlink()
+    elif wanted["keep"]:
+        shutil.copy(cut, HERE)
+        print(f"{cut.name}: {cut.stat().st_size / 1000:.0f} kB, {colours} colours", flush=True)
     request.unlink()  # Blender goes on
-    print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB, {colours} colours", flush=True)
 
 
 def run_blender(executable: str, folder: Path, names: list[str]) -> None:
