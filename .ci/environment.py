@@ -36,7 +36,7 @@ SYSTEM_PACKAGES = (
 
 
 def requirements() -> list[str]:
-    """What pyproject.toml asks for: to run, Blender's module, the bundled release, the developers' tools, the manual's."""
+    """What pyproject.toml asks for: to run, Blender's module, the bundled release, developers' tools, the manual's."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     groups = project["dependency-groups"]
     return [

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import animations
+import disks
 import lens
 import maps
 import plots
@@ -38,6 +39,7 @@ def main() -> None:
     table.add([measuring.describe_machine(), "one core, unless it says otherwise", "", measuring.Row.HEADINGS])
     table.add(tracing.rows(options.repeats, options.kgeo))
     table.add(maps.rows(options.repeats))
+    table.add(["", *disks.lines(options.repeats), ""])
     table.add(animations.rows(options.frames, options.orbit_frames))
     table.add(lens.rows(min(options.repeats, LENS_REPEATS)))
     table.add(["", *maps.file_lines(options.repeats)])

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .metric import horizon_radius
 from .observer import Observer
 from .orbiting_matter import redshift_factor
 from .polar import PolarMotion
-from .radial_path import places_of_rays
+from .radial_path import HORIZON_MARGIN, places_of_rays
 from .rays import Array, Rays, negative_energy_rays, rays_from_camera
 from .tracer import Fate
 from .trapped import comes_from_sky, find_barrier
@@ -26,15 +27,16 @@ from .trapped import comes_from_sky, find_barrier
 class Crossings:
     """Crossings of the equatorial plane in their order along the backward ray; arrays of shape (count, n).
 
-    NaN where there is none, unless asked for beyond the ray's end, where u goes on smoothly past its last value.
+    NaN where there is none, unless asked for beyond the ray's end: there u goes on smoothly to 0 and less, or to
+    1 / r_+ and more.
     """
 
     u: Array
     """1 / r, in 1/M."""
     u_slope: Array
     """du / dlambda of the ray backwards: u^2 Delta p_r of the light."""
-    phi: Array
-    """Azimuth in the hole's frame, radians, unwrapped from the camera's."""
+    unwound: Array
+    """Azimuth in the hole's frame, radians, without `radial_path.winding`: regular at the horizon."""
     mino_time: Array
     """Mino time from the camera, in 1/M, for energy +-1 at infinity."""
     fate: NDArray[np.uint8]
@@ -43,12 +45,12 @@ class Crossings:
     @classmethod
     def empty(cls, count: int, rays: int) -> Crossings:
         """Return crossings that are all unknown."""
-        u, u_slope, phi, mino_time = (np.full((count, rays), np.nan) for _ in range(4))
-        return cls(u, u_slope, phi, mino_time, np.full(rays, Fate.UNRESOLVED, dtype=np.uint8))
+        u, u_slope, unwound, mino_time = (np.full((count, rays), np.nan) for _ in range(4))
+        return cls(u, u_slope, unwound, mino_time, np.full(rays, Fate.UNRESOLVED, dtype=np.uint8))
 
     def put(self, index: NDArray[np.intp] | NDArray[np.bool_], other: Crossings) -> None:
         """Take over the crossings of the rays of `index`."""
-        for name in ("u", "u_slope", "phi", "mino_time"):
+        for name in ("u", "u_slope", "unwound", "mino_time"):
             getattr(self, name)[:, index] = getattr(other, name)
         self.fate[index] = other.fate
 
@@ -86,7 +88,12 @@ def cross_plane(
     times, azimuth = motion.plane_crossings(count, tolerance)
     if wanted is not None:
         times[~wanted] = np.nan
-    found = places_of_rays(rays, barrier, times, tolerance, beyond)
+    found = places_of_rays(rays, barrier, times, tolerance)
+    if not beyond:
+        with np.errstate(invalid="ignore"):
+            ended = (found.u <= 0.0) | (found.u * (horizon_radius(rays.spin) * HORIZON_MARGIN) >= 1.0)
+        for values in (found.u, found.u_slope, found.unwound):
+            values[ended] = np.nan
     reached = np.isfinite(found.u)
     # A ray that never crosses is resolved as it is.
     resolved = found.resolved | np.isnan(times).all(axis=0)
@@ -94,7 +101,7 @@ def cross_plane(
     return Crossings(
         found.u,
         found.u_slope,
-        azimuth + found.psi,
+        azimuth + found.unwound,
         np.where(reached, times, np.nan),
         np.where(resolved, fate, Fate.UNRESOLVED).astype(np.uint8),
     )

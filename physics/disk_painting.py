@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Filling the passes of a disk: interpolated where its image is smooth, traced where it is not.
 
-For each crossing, u = 1 / r and the azimuth, as (cos, sin), are smooth functions of the pixel, also across the disk's
-rims and across the shadow's edge: which side a ray ends on changes only later crossings. So tiles are sampled as for
-the sky (`tiles`), rims and all, and how much of a pixel the annulus covers follows from u and its slope there. Tiles
-where that is not enough are divided, and at last traced pixel by pixel, and those pixels at a rim where even a
-neighbour is too far away are traced at finer places inside them.
+For each crossing, u = 1 / r and the azimuth, unwound as in `radial_path`, are smooth functions of the pixel: across the
+disk's rims, across the shadow's edge, and on beyond infinity and the horizon. So are the light's energy and angular
+momentum for a camera energy of 1, from which a formula gives the redshift at the disk. So tiles are sampled as for the
+sky (`tiles`), rims and all, and how much of a pixel the annulus covers follows from u and its slope there. Tiles where
+that is not enough are divided, and at last traced pixel by pixel, and those pixels at a rim where even a neighbour is
+too far away are traced at finer places inside them.
 """
 
 from __future__ import annotations
@@ -19,9 +20,12 @@ from numpy.typing import NDArray
 
 from .annulus import coverage, near_annulus, nearest_covered
 from .disk_pass import DiskPass
-from .metric import horizon_radius
+from .metric import isco_radius
+from .orbiting_matter import circular_redshift, redshift_factor
 from .painting import wrapped
+from .radial_path import winding
 from .rays import Array
+from .ring_table import Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
 from .tiles import (
     TAIL,
@@ -34,7 +38,7 @@ from .tiles import (
     sides_for,
     tiles_of,
 )
-from .tracer import BLOCK_SIZE, Fate
+from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
 from .view import View
 
 Mask = NDArray[np.bool_]
@@ -51,6 +55,19 @@ PIXEL_ERROR = 0.03
 
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
+
+# The side of the tiles from which on tables serve the later images, if their tiles would ask for this many rays, each
+# of them in so many rounds.
+TABLE_SIDE = 32
+WORTHWHILE_RAYS = 12_000
+TABLE_ROUNDS = 3
+# A table is made of this share of them.
+TABLE_SHARE = 0.35
+# Outside of this radius there are no rays of negative energy, at any latitude.
+ERGOSPHERE = 2.0
+
+# Chebyshev coefficients looked up at a time for single pixels at a rim.
+GROUP_VALUES = 1 << 20
 
 # So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far: for samples
 # that must stay smooth, and for differences between pixels.
@@ -69,15 +86,12 @@ MARKED_CIRCLES, MARKED_PLACES = 8, 256
 # Pixels below which the spread of these places, across where it is least, makes a slim disk.
 SLIM = 8.0
 
-# Channels of what is interpolated.
-CHANNELS = 4
-U, COS, SIN, G = range(CHANNELS)
+# Channels of what is interpolated: 1 / r, the unwound azimuth, energy and angular momentum of the light for a camera
+# energy of 1, and where matter falls du / dlambda on the same scale.
+U, PHI, ENERGY, MOMENTUM, SLOPE = range(5)
 
-# g is smooth only where there is an orbit, or a fall: beyond so many outer and inner radii, and next to the horizon, it
-# is held.
-FARTHEST_G, INNERMOST_G, NEAREST_G = 3.0, 0.8, 1.0001
-# At a rim g changes along with the place by no more than this factor.
-LARGEST_CHANGE = 1.5
+# A disk that reaches inside the ISCO by less than this share of its radius does not.
+AT_ISCO = 1e-9
 
 
 class DiskPainting:
@@ -88,8 +102,9 @@ class DiskPainting:
         self._parameters = parameters
         self._disk = parameters.disk
         self._inner, self._outer = self._disk.radii(parameters.spin)
-        nearest = max(NEAREST_G * horizon_radius(parameters.spin), INNERMOST_G * self._inner)
-        self._bounds_of_g = 1.0 / (FARTHEST_G * self._outer), 1.0 / nearest
+        isco = isco_radius(parameters.spin, prograde=not self._disk.retrograde)
+        self._falls = self._inner < isco * (1.0 - AT_ISCO)
+        self._channels = SLOPE + 1 if self._falls else SLOPE
         self._tolerance = max(parameters.tolerance, TRACING_SHARE * PLACE_ERROR * parameters.interpolation)
         self._view = View(parameters)
         self._width, self._height = parameters.map_size
@@ -98,6 +113,7 @@ class DiskPainting:
         self._far = np.zeros((self._disk.crossings, self._height, self._width), dtype=bool)
         self._unresolved = np.zeros((self._height, self._width), dtype=bool)
         self._rays = 0
+        self._tables: dict[int, RingTable] = {}
 
     def counts(self) -> dict[str, int]:
         """Number of rays that were traced for the passes, and of pixels whose ray was given up."""
@@ -127,7 +143,35 @@ class DiskPainting:
 
         u is finite everywhere: rays that never cross count as far beyond their end.
         """
-        values = np.empty((self._disk.crossings, CHANNELS, len(x)))
+        if not self._tables:
+            return self._trace_rays(x, y, wanted)
+        values, lost = np.full((self._disk.crossings, self._channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
+        asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
+        rays, light = self._view.rays(x[asked], y[asked]), self._view.light(x[asked], y[asked])
+        left = wanted.copy()
+        for order, table in self._tables.items():
+            here = np.flatnonzero(wanted[order, asked])
+            place = table.places(light[:, here], 3 if self._falls else 2)
+            known = np.isfinite(place[0])
+            here, place = here[known], place[:, known]
+            left[order, asked[here]] = False
+            one_plus_z = rays.one_plus_z[here]
+            found = [self._clipped(place[0]), place[1], one_plus_z, rays.b[here] * one_plus_z]
+            if self._falls:
+                found.append(place[2] * one_plus_z)
+            values[order, :, asked[here]] = np.stack(found, axis=1)
+        traced = np.flatnonzero(left.any(axis=0))
+        part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
+        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
+        return values, lost
+
+    def _clipped(self, u: Array) -> Array:
+        clipped: Array = np.clip(u, LOWEST_U / self._outer, HIGHEST_U / self._inner)
+        return clipped
+
+    def _trace_rays(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
+        """Do what `_sample` does, a ray for each place."""
+        values = np.empty((self._disk.crossings, self._channels, len(x)))
         lost = np.zeros(len(x), dtype=bool)
         for start in range(0, len(x), BLOCK_SIZE):
             block = slice(start, start + BLOCK_SIZE)
@@ -141,13 +185,13 @@ class DiskPainting:
             )
             low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
             nowhere = np.where(found.fate == Fate.SHADOW, high, low)
-            u = np.clip(np.where(np.isnan(found.u), nowhere, found.u), low, high)
+            u = self._clipped(np.where(np.isnan(found.u), nowhere, found.u))
             values[:, U, block] = np.where(wanted[:, block], u, np.nan)
-            for order in np.flatnonzero(wanted[:, block].any(axis=1)):
-                phi, u = np.nan_to_num(found.phi[order]), np.clip(found.u[order], *self._bounds_of_g)
-                g = light.g(self._parameters.spin, u, found.u_slope[order], self._disk.retrograde)
-                values[order, COS, block], values[order, SIN, block] = np.cos(phi), np.sin(phi)
-                values[order, G, block] = np.nan_to_num(g)
+            values[:, PHI, block] = np.nan_to_num(found.unwound)
+            values[:, ENERGY, block] = light.energy / light.camera_energy
+            values[:, MOMENTUM, block] = light.b / light.camera_energy
+            if self._falls:
+                values[:, SLOPE, block] = np.nan_to_num(found.u_slope / light.camera_energy)
             lost[block] = found.fate == Fate.UNRESOLVED
         self._rays += len(x)
         return values, lost
@@ -162,6 +206,8 @@ class DiskPainting:
         done, share = 0.0, 0.6 / len(sides)
         for side in sides:
             marked = self._marked(waiting, marked_x, marked_y)
+            if side == TABLE_SIDE:
+                self._make_tables(wanted)
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
@@ -176,6 +222,25 @@ class DiskPainting:
                 inside = (waiting.column < self._width) & (waiting.row < self._height)
                 waiting, wanted = waiting.select(inside), wanted[inside]
         yield from self._trace(waiting, wanted, done)
+
+    def _make_tables(self, wanted: Mask) -> None:
+        """Make tables of the later images that still ask for many rays; `wanted`: by tile and crossing."""
+        rays = np.count_nonzero(wanted, axis=0) * (TABLE_ROUNDS * DISK_POINTS**2)
+        orders = {k: TABLE_SHARE * rays[k] for k in range(1, self._disk.crossings) if rays[k] > WORTHWHILE_RAYS}
+        observer = self._parameters.observer()
+        stepping = self._parameters.method != DEFAULT_METHOD
+        if not orders or stepping or observer.r < ERGOSPHERE:
+            return
+        needs = Needs(
+            self._inner,
+            self._outer,
+            self._tolerance,
+            self._parameters.pixel_angle,
+            PIXEL_ERROR,
+            PLACE_ERROR * self._parameters.interpolation,
+        )
+        self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
+        self._rays += sum(table.rays for table in self._tables.values())
 
     def _marked_places(self) -> tuple[Array, Array]:
         """Return pixel coordinates of the hole's centre and, if it is slim, on the disk as flat space would show it.
@@ -213,6 +278,8 @@ class DiskPainting:
             chosen = np.flatnonzero(wanted[part, order] & ~broken)
             if not len(chosen):
                 continue
+            azimuth = sampled[PHI, chosen]
+            sampled[PHI, chosen] = azimuth[:, :1, :1] + nearest_turn(azimuth - azimuth[:, :1, :1])
             u = sampled[U, chosen].reshape(len(chosen), -1)
             low, high = u.min(axis=1), u.max(axis=1)
             off = np.maximum(1.0 / self._outer - high, low - 1.0 / self._inner)
@@ -220,11 +287,11 @@ class DiskPainting:
             size = np.abs(coefficients)
             tail = size[:, :, -TAIL:, :].sum(axis=(2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(2, 3))
             pixel = np.hypot(coefficients[:, :, 0, 1], coefficients[:, :, 1, 0]) * (2.0 * PIXEL_ERROR / tiles.side)
-            turned = np.maximum(np.hypot(pixel[:, COS], pixel[:, SIN]), allowed)[:, None]
             along = np.maximum(pixel[:, U], allowed / self._outer)
             empty = (off > EMPTY_MARGIN * tail[:, U]) & (~marked[chosen] | (TAIL_SHARE * tail[:, U] < along))
-            good = (TAIL_SHARE * tail[:, U] < along) & (TAIL_SHARE * tail[:, COS:G] < turned).all(axis=1)
-            good &= TAIL_SHARE * tail[:, G] < np.maximum(pixel[:, G], allowed)
+            good = (TAIL_SHARE * tail[:, U] < along) & (TAIL_SHARE * tail[:, PHI] < np.maximum(pixel[:, PHI], allowed))
+            if self._falls:
+                good &= TAIL_SHARE * tail[:, SLOPE] < np.maximum(pixel[:, SLOPE], allowed)
             good &= ~empty
             if good.any():
                 self._fill(tiles.select(chosen[good]), coefficients[good], order)
@@ -241,71 +308,104 @@ class DiskPainting:
         """Fill whole tiles from Chebyshev coefficients, shape (n, channels, DISK_POINTS, DISK_POINTS)."""
         # Single precision is what is written, and enough for sums of terms of order 1.
         base = at_pixels(tiles.side, DISK_POINTS)[0].astype(np.float32)
-        coefficients = coefficients.astype(np.float32)
-        values = base @ coefficients @ base.T
+        single = coefficients.astype(np.float32)
+        values: NDArray[Any] = base @ single @ base.T
         u = values[:, U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is a small part of a tile's.
         reach = (high - low) / tiles.side
         whole = (low - reach > 1.0 / self._outer) & (high + reach < 1.0 / self._inner)
         if whole.any():
-            self._write_whole(tiles.select(whole), values[whole], order)
+            self._write_tiles(order, tiles.select(whole), values[whole], None)
         rim = np.flatnonzero(~whole)
         if len(rim):
-            self._put_rim(order, tiles.select(rim), coefficients[rim], values[rim])
+            self._fill_rim(order, tiles.select(rim), single[rim], values[rim])
 
-    def _put_rim(self, order: int, tiles: Tiles, coefficients: Array, values: Array) -> None:
+    def _fill_rim(
+        self, order: int, tiles: Tiles, coefficients: NDArray[Any], values: NDArray[Any]
+    ) -> None:
         """Write tiles with a rim in them from Chebyshev coefficients and the channels, (n, channels, side, side)."""
+        u = values[:, U]
+        off = np.maximum(1.0 / self._outer - u, u - 1.0 / self._inner)
+        # Half of the steps to both neighbours reaches a pixel's corner; slopes hardly change from one to the next.
+        steps = np.zeros_like(u)
+        steps[:, :, 1:] += np.abs(np.diff(u, axis=2))
+        steps[:, 1:] += np.abs(np.diff(u, axis=1))
+        steps[:, :, 0], steps[:, 0] = steps[:, :, 1], steps[:, 1]
+        near = np.abs(off) < steps
+        covered = (off < 0.0) & ~near
+        partial = self._partly_covered(tiles, coefficients[:, U], near, covered)
+        values[:, U] = np.clip(u, 1.0 / self._outer, 1.0 / self._inner)
+        self._write_tiles(order, tiles, values, covered)
+        (tile, row, column), share, met, (x, y) = partial
         base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
-        u, across, down = values[:, U], base @ coefficients[:, U] @ slope.T, slope @ coefficients[:, U] @ base.T
-        columns, rows = (np.broadcast_to(each, u.shape) for each in tiles.pixels())
-        share = coverage(u, across, down, self._inner, self._outer)
-        share[(columns >= self._width) | (rows >= self._height)] = 0.0
-        whole, partly = share == 1.0, (share > 0.0) & (share < 1.0)
-        self._write(order, (columns[whole], rows[whole]), np.moveaxis(values, 1, 0)[:, whole], share[whole])
-        tile, row, column = np.nonzero(partly)
-        if not len(tile):
-            return
-        inside, x, y = nearest_covered(u[partly], across[partly], down[partly], self._inner, self._outer)
-        along = base[column] + slope[column] * x[:, None]
-        upright = base[row] + slope[row] * y[:, None]
-        met = np.einsum("ni,ncij,nj->cn", upright, coefficients[tile], along, optimize=True)
-        met[U] = inside
-        self._write(order, (columns[partly], rows[partly]), met, share[partly])
+        along, upright = base[column] + slope[column] * x[:, None], base[row] + slope[row] * y[:, None]
+        here = np.einsum("ncj,nj->cn", np.einsum("ni,ncij->ncj", upright, coefficients[tile]), along)
+        here[U] = met
+        place = (tiles.column[tile] + column, tiles.row[tile] + row)
+        self._write(order, place, self._matter(here), share)
 
-    def _write_whole(self, tiles: Tiles, values: Array, order: int) -> None:
-        """Write tiles that the disk covers wholly, from channels of shape (n, channels, side, side)."""
-        radius, phi = 1.0 / values[:, U], wrapped(np.arctan2(values[:, SIN], values[:, COS]))
-        channels: tuple[NDArray[np.floating[Any]], ...] = (radius, phi, values[:, G], np.ones_like(radius))
-        for plane, channel in zip(self._planes[order], channels, strict=True):
+    def _partly_covered(
+        self, tiles: Tiles, coefficients: NDArray[Any], near: Mask, covered: Mask
+    ) -> tuple[tuple[NDArray[np.intp], ...], Array, Array, tuple[Array, Array]]:
+        """Return tile, row and column of pixels at a rim, their coverage, u within the annulus, and where in the pixel
+        that is met; mark those that are `covered` wholly. `coefficients`: of u, (n, DISK_POINTS, DISK_POINTS)."""
+        tile, row, column = np.nonzero(near)
+        inside = (tiles.column[tile] + column < self._width) & (tiles.row[tile] + row < self._height)
+        tile, row, column = tile[inside], row[inside], column[inside]
+        base, slope = (each.astype(np.float32) for each in at_pixels(tiles.side, DISK_POINTS))
+        group = max(1, GROUP_VALUES // DISK_POINTS**2)
+        found = np.empty((3, len(tile)))
+        for start in range(0, len(tile), group):
+            part = slice(start, start + group)
+            own = coefficients[tile[part]]
+            across = np.einsum("nij,nj->ni", own, base[column[part]])
+            found[0, part] = np.einsum("ni,ni->n", base[row[part]], across)
+            found[2, part] = np.einsum("ni,ni->n", slope[row[part]], across)
+            across = np.einsum("nij,nj->ni", own, slope[column[part]])
+            found[1, part] = np.einsum("ni,ni->n", base[row[part]], across)
+        share = coverage(found[0], found[1], found[2], self._inner, self._outer)
+        whole = share == 1.0
+        covered[tile[whole], row[whole], column[whole]] = True
+        left = np.flatnonzero((share > 0.0) & ~whole)
+        met = found[:, left]
+        u, x, y = nearest_covered(met[0], met[1], met[2], self._inner, self._outer)
+        return (tile[left], row[left], column[left]), share[left], u, (x, y)
+
+    def _write_tiles(self, order: int, tiles: Tiles, values: NDArray[Any], covered: Mask | None) -> None:
+        """Write tiles from channels of shape (n, channels, side, side), where they are wholly covered: None for all."""
+        radius, phi, g = self._matter(np.moveaxis(values, 1, 0))
+        share = np.ones_like(radius) if covered is None else covered.astype(radius.dtype)
+        for plane, channel in zip(self._planes[order], (radius, phi, g, share), strict=True):
+            if covered is not None:
+                channel *= covered
             tiles.put(plane, channel)
 
-    def _put(
-        self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], values: Array, across: Array, down: Array
-    ) -> None:
-        """Write pixels, from channels and their slopes of shape (n, channels, side, side)."""
-        share = coverage(values[:, U], across[:, U], down[:, U], self._inner, self._outer)
-        seen = (share > 0.0) & (columns < self._width) & (rows < self._height)
-        if not seen.any():
-            return
-        place = (columns[seen], rows[seen])
-        here, right, below = (np.moveaxis(each, 1, 0)[:, seen] for each in (values, across, down))
-        u, x, y = nearest_covered(here[U], right[U], below[U], self._inner, self._outer)
-        moved = here + right * x + below * y
-        moved[U] = u
-        moved[G] = np.clip(moved[G], here[G] / LARGEST_CHANGE, here[G] * LARGEST_CHANGE)
-        self._write(order, place, moved, share[seen])
+    def _matter(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
+        u, spin, retrograde = values[U], self._parameters.spin, self._disk.retrograde
+        phi = values[PHI] + winding(spin, u)
+        turn = phi.dtype.type(2.0 * math.pi)
+        phi -= turn * np.floor(phi * (1.0 / turn))
+        radius = 1.0 / u
+        if self._falls:
+            radial = values[SLOPE] / (u * u)
+            g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
+        else:
+            g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)
+        return radius, wrapped(phi), g
 
     def _write(
-        self, order: int, place: tuple[NDArray[np.intp], NDArray[np.intp]], values: Array, share: Array
+        self,
+        order: int,
+        place: tuple[NDArray[np.intp], NDArray[np.intp]],
+        matter: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+        share: Array,
     ) -> None:
-        """Write pixels given by column and row, from channels of shape (channels, n)."""
+        """Write pixels given by column and row, from radius, azimuth and g of shape (n,)."""
         columns, rows = place
-        planes = self._planes[order]
-        planes[0, rows, columns] = 1.0 / values[U]
-        planes[1, rows, columns] = wrapped(np.arctan2(values[SIN], values[COS]))
-        planes[2, rows, columns] = values[G]
-        planes[3, rows, columns] = share
+        for plane, values in zip(self._planes[order], (*matter, share), strict=True):
+            plane[rows, columns] = values
 
     # --- pixel by pixel ------------------------------------------------------------------------------
 
@@ -325,7 +425,7 @@ class DiskPainting:
         looked = (np.minimum(rows, self._height - 1), np.minimum(columns, self._width - 1))
         every = wanted.T[:, :, None, None] & ~self._far[:, *looked]
         traced: Mask = every.any(axis=0)
-        values = np.full((self._disk.crossings, CHANNELS, *shape), np.nan)
+        values = np.full((self._disk.crossings, self._channels, *shape), np.nan)
         x, y = columns[traced].astype(np.float64) + 0.5, rows[traced].astype(np.float64) + 0.5
         values[:, :, traced], lost = self._sample(x, y, every[:, traced])
         given_up = np.zeros(shape, dtype=bool)
@@ -336,18 +436,21 @@ class DiskPainting:
             chosen = np.flatnonzero(wanted[:, order])
             if not len(chosen):
                 continue
-            here: Array = np.moveaxis(channels[:, chosen], 0, 1)
-            here[:, U] = np.clip(here[:, U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
-            down: Array = np.gradient(here, axis=2)
-            across: Array = np.gradient(here, axis=3)
-            finer = self._needs_finer(here[:, U], across[:, U], down[:, U])
+            here = channels[:, chosen]
+            here[U] = np.clip(here[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
+            down, across = np.gradient(here[U], axis=1), np.gradient(here[U], axis=2)
+            finer = self._needs_finer(here[U], across, down)
             finer &= inside[chosen]
-            smooth = np.where(finer[:, None], 0.0, here)  # u = 0 is off the disk
             with np.errstate(invalid="ignore"):
-                self._put(order, columns[chosen], rows[chosen], smooth, *(
-                    np.where(finer[:, None], 0.0, each) for each in (across, down)
-                ))
-            self._divide(order, columns[chosen][finer], rows[chosen][finer], np.moveaxis(here, 1, 0)[:, finer])
+                share = coverage(here[U], across, down, self._inner, self._outer)
+                seen = np.nonzero((share > 0.0) & ~finer & inside[chosen])
+            u, x, y = nearest_covered(here[U][seen], across[seen], down[seen], self._inner, self._outer)
+            right, below = _slopes(here, seen)
+            moved = here[:, seen[0], seen[1], seen[2]] + right * x + below * y
+            moved[U] = u
+            place = (columns[chosen][seen], rows[chosen][seen])
+            self._write(order, place, self._matter(moved), share[seen])
+            self._divide(order, columns[chosen][finer], rows[chosen][finer], here[:, finer])
 
     def _needs_finer(self, u: Array, across: Array, down: Array) -> Mask:
         """Return which pixels have a rim in or beside them that is not nearly straight, shape (n, side, side)."""
@@ -375,17 +478,48 @@ class DiskPainting:
             alone = np.zeros((self._disk.crossings, x.size), dtype=bool)
             alone[order] = True
             values, _ = self._sample(x.ravel(), y.ravel(), alone)
-            values = values[order].reshape(-1, *x.shape)
-            values[U] = np.clip(values[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
-            down, across = np.gradient(values[U], axis=(1, 2))
-            shares = coverage(values[U], across, down, self._inner, self._outer).reshape(len(column), -1)
+            here = values[order].reshape(-1, *x.shape)
+            here[U] = np.clip(here[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
+            down, across = np.gradient(here[U], axis=(1, 2))
+            shares = coverage(here[U], across, down, self._inner, self._outer).reshape(len(column), -1)
             share = shares.mean(axis=1)
             seen = share > 0.0
+            here = here.reshape(self._channels, len(column), -1)[:, seen]
+            here[U] = np.clip(here[U], 1.0 / self._outer, 1.0 / self._inner)
+            radius, phi, g = self._matter(here)
             # A pixel that is partly covered, or by all of the disk at once, shows its mean: one place of it would
             # twinkle from pixel to pixel along a thin ring.
-            values[U] = np.clip(values[U], 1.0 / self._outer, 1.0 / self._inner)
             weights = shares[seen] / shares[seen].sum(axis=1, keepdims=True)
-            mean = (values.reshape(CHANNELS, len(column), -1)[:, seen] * weights).sum(axis=-1)
-            flat = np.where(share[seen] == 1.0, centres[:, start : start + group][:, seen], mean)
-            flat[U] = np.clip(flat[U], 1.0 / self._outer, 1.0 / self._inner)
-            self._write(order, (column[seen], row[seen]), flat, share[seen])
+            mean = [(each * weights).sum(axis=1) for each in (1.0 / radius, np.cos(phi), np.sin(phi), g)]
+            azimuth = np.arctan2(mean[2], mean[1])
+            matter = [1.0 / mean[0], azimuth + 2.0 * math.pi * (azimuth < 0.0), mean[3]]
+            whole = share[seen] == 1.0
+            centre = centres[:, start : start + group][:, seen][:, whole]
+            centre[U] = np.clip(centre[U], 1.0 / self._outer, 1.0 / self._inner)
+            for each, central in zip(matter, self._matter(centre), strict=True):
+                each[whole] = central
+            matter[1] = wrapped(matter[1])
+            self._write(order, (column[seen], row[seen]), (matter[0], matter[1], matter[2]), share[seen])
+
+
+def nearest_turn(angle: Array) -> Array:
+    """Return angles brought to [-pi, pi] by whole turns."""
+    turn = 2.0 * math.pi
+    near: Array = angle - turn * np.round(angle * (1.0 / turn))
+    return near
+
+
+def _slopes(values: Array, place: tuple[NDArray[np.intp], ...]) -> tuple[Array, Array]:
+    """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, side, side)
+    at some places; none where a neighbour is not known."""
+    tile, row, column = place
+    last = values.shape[-1] - 1
+    found = []
+    for down, right in ((0, 1), (1, 0)):
+        before = values[:, tile, np.maximum(row - down, 0), np.maximum(column - right, 0)]
+        after = values[:, tile, np.minimum(row + down, last), np.minimum(column + right, last)]
+        steps = 1.0 + ((row if down else column) % last != 0)  # one only at the tile's own edge
+        change = after - before
+        change[PHI] = nearest_turn(change[PHI])
+        found.append(np.nan_to_num(change / steps))
+    return found[0], found[1]

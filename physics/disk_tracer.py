@@ -13,6 +13,7 @@ from .crossings import Crossings, LightAtDisk, cross_plane, split_by_energy
 from .errors import BlackHoleError
 from .observer import Observer
 from .plane_stepping import step_to_plane
+from .radial_path import winding
 from .rays import Array, Rays, camera_directions, rays_from_camera
 from .tracer import (
     DEFAULT_MAX_STEPS,
@@ -52,7 +53,7 @@ def _by_steps(
     if beyond:
         ended = np.isnan(found.u) & (found.fate != Fate.UNRESOLVED)
         other = cross_plane(rays, count, tolerance, beyond=True)
-        for name in ("u", "u_slope", "phi"):
+        for name in ("u", "u_slope", "unwound"):
             np.copyto(getattr(found, name), getattr(other, name), where=ended)
     return found
 
@@ -155,7 +156,7 @@ def trace_disk(
     def shaped(values: Array) -> Array:
         return np.moveaxis(values.reshape(crossings, *theta.shape), 0, -1)
 
-    azimuth = found.phi % (2.0 * np.pi)
+    azimuth = (found.unwound + winding(spin, found.u)) % (2.0 * np.pi)
     azimuth[azimuth >= 2.0 * np.pi] = 0.0  # a tiny negative angle rounds up to 2 pi itself
     return DiskResult(
         shaped(1.0 / found.u), shaped(azimuth), shaped(g), shaped(found.mino_time), found.fate.reshape(theta.shape)

@@ -10,9 +10,10 @@ spin -a, and light the angular momentum -b. So all formulae are for matter that 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .metric import check_spin, horizon_radius, isco_radius
 from .rays import Array
@@ -78,19 +79,26 @@ def redshift_factor(
     r, energy = np.asarray(radius, dtype=np.float64), np.asarray(energy, dtype=np.float64)
     isco = isco_radius(spin, prograde=not retrograde)
     with np.errstate(invalid="ignore", divide="ignore"):
-        outside = 1.0 / _circular(a, np.maximum(r, isco), b, energy)
+        outside = circular_redshift(spin, 1.0 / np.maximum(r, isco), direction * b, energy, retrograde)
         if not (r < isco).any():
             return outside
         inside = 1.0 / _falling(a, r, b, energy, np.asarray(radial, dtype=np.float64), isco)
     return np.where(r < isco, inside, outside)
 
 
-def _circular(a: float, r: Array, b: Array, energy: Array) -> Array:
-    """Return -p . u for circular geodesics: u^t (E - Omega L), u^t from BPT Eqs. 2.12, 2.16."""
-    root = 1.0 / (r * np.sqrt(r))
-    time = (1.0 + a * root) / np.sqrt(1.0 - 3.0 / r + 2.0 * a * root)
-    product: Array = time * (energy - b * root / (1.0 + a * root))
-    return product
+def circular_redshift(
+    spin: float, u: NDArray[Any], b: NDArray[Any], energy: NDArray[Any], retrograde: bool = False
+) -> NDArray[Any]:
+    """Return what `redshift_factor` does for matter on circular geodesics at 1 / r = `u`, in the precision of `u`.
+
+    -p . u = u^t (E - Omega L) with u^t from BPT Eqs. 2.12 and 2.16, multiplied out.
+    """
+    direction = matter_direction(spin, retrograde)
+    a = direction * spin
+    root = u * np.sqrt(u)
+    factor: NDArray[Any] = np.sqrt(1.0 - 3.0 * u + (2.0 * a) * root)
+    factor /= energy + root * (a * energy - direction * b)
+    return factor
 
 
 def _falling(a: float, r: Array, b: Array, energy: Array, radial: Array, isco: float) -> Array:

@@ -19,7 +19,7 @@ from .crossings import Crossings
 from .metric import horizon_radius
 from .mino import FIRST_ANGLE, radial_polynomial
 from .polar import IN_PLANE
-from .radial_path import HORIZON_MARGIN
+from .radial_path import HORIZON_MARGIN, winding
 from .rays import Array, Rays
 from .runge_kutta import CASH_KARP, attempt, integrate
 from .sphere import spherical_triad
@@ -152,5 +152,5 @@ def step_to_plane(rays: Rays, count: int, tolerance: float, max_steps: int) -> C
     places = np.moveaxis(watcher.places, 1, 0)
     places[:, :, ~ended] = np.nan
     fate = np.where(ended, np.where(sky, Fate.SKY, Fate.SHADOW), Fate.UNRESOLVED).astype(np.uint8)
-    phi = np.arctan2(places[3], places[2]) + places[PSI]
-    return Crossings(places[U], places[U_PRIME], phi, places[TIME], fate)
+    unwound = np.arctan2(places[3], places[2]) + places[PSI] - winding(rays.spin, places[U])
+    return Crossings(places[U], places[U_PRIME], unwound, places[TIME], fate)

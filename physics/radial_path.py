@@ -7,14 +7,25 @@ series, integrated term by term, give lambda and psi for every x at once, and Ne
 time, whatever the number of them. The highest coefficients tell the error (Trefethen 2013, Approximation Theory and
 Approximation Practice, ch. 8); rays whose series have not converged get twice the points.
 
-Four kinds of ray: those that turn outside their barrier and those that go straight out end at infinity, u = 0; those
-that go straight in and those that turn inside their barrier end at the horizon. All have u = u_c (1 +- x) or
-u_c (1 +- x^2). At the horizons psi' has poles at u = 1 / r_+-, and with Eq. 3, where U = (P u^2)^2 at both of them,
-they contribute -+ sign(P) a / (r_+ - r_-) dx / (x_+- - x): taken out and integrated by hand, they leave a smooth rest.
+Four kinds of ray: those that turn outside their barrier and those that go straight out go on to infinity, u = 0;
+those that go straight in and those that turn inside their barrier end at the horizon. All have u = u_c (1 +- x) or
+u_c (1 +- x^2). The equations know neither end: u goes on through 0 to a negative root of U, and through the horizon, so
+u is a smooth function of the ray also where some rays have ended, and paths are followed some way beyond.
+
+At the horizon psi is infinite: it winds up like +- W(u),
+W(u) = a / (r_+ - r_-) ln((1 - r_+ u) / (1 - r_- u)), dW = -a du / (1 - 2 u + a^2 u^2), which is what Kerr's own
+azimuth differs by from Boyer and Lindquist's (Kerr 1963, Phys. Rev. Lett. 11, 237). Along a ray, with
+p = 1 + a (a - b) u^2 and S = |du / dlambda|, psi' = a - a p / (1 - 2 u + a^2 u^2), and since by Eq. 3
+p^2 - S^2 = (1 - 2 u + a^2 u^2)(q + (b - a)^2) u^2,
+
+    psi' = +- W'(u) S + a - a (q + (b - a)^2) u^2 / (p + S),
+
+the upper sign for rays on their way in. What is left of W is regular at the horizon, and that is what is integrated.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -39,11 +50,11 @@ SMALL_PRODUCT = 200_000
 # Rays worked through at a time: their samples stay in the cache.
 CHUNK = 4096
 
-# Highest coefficients that tell the error, and the share of the tolerance that they may amount to.
-# Integration divides the k-th coefficient by 2 k: what is left out of lambda is far smaller than what its derivative
-# lacks. Next to the horizon, taking out the poles leaves rounding of some 1e-11, which is no lack of points.
+# Highest coefficients that tell the error, and how many times the tolerance they may amount to: they are those of the
+# derivative, of which integration leaves 1 / (2 k), and what is left out is smaller still. Errors were found to be a
+# third of the tolerance at the most. Rounding of some 1e-11 next to the horizon is no lack of points.
 TAIL = 2
-TAIL_SHARE = 4.0
+TAIL_SHARE = 100.0
 ROUNDING = 1e-9
 
 # A ray has ended before a Mino time for certain if it is later by this many times the coefficients that tell the error.
@@ -55,8 +66,13 @@ ENDED_ERROR = 1e-3
 NEWTON_ROUNDS = 6
 LAST_CHANGE = 0.03
 
-# The horizon itself, where psi is infinite, is not reached: paths end at this multiple of its radius.
+# The horizon itself, where psi is infinite, is not reached: rays end at this multiple of its radius.
 HORIZON_MARGIN = 1.0 + 1e-9
+
+# How far paths go beyond infinity, as a share of the way to U's negative root; and beyond the horizon, as a share of
+# the way to the inner one, and at most to this many times 1 / r_+.
+BEYOND = 0.7
+MOST_BEYOND = 2.0
 
 # A singularity nearer to x = 0 than this share of the way is stretched away.
 STRETCH_BELOW = 0.7
@@ -72,6 +88,8 @@ class RadialPath:
     sign: float
     """-1 for rays that end at infinity, 1 for those that end at the horizon."""
     b: Array
+    drag: Array
+    """q + (b - a)^2."""
     rates: Array
     """Polynomial of x'^2 in x or x^2, low powers first, shape (4 or 5, n)."""
     unit: Array
@@ -100,6 +118,18 @@ class RadialPath:
         slope: Array = self.sign * self.unit * self.speed(x)
         return 2.0 * x * slope if self.squared else slope
 
+    def u_bend(self, x: Array) -> Array:
+        """Return d^2 u / dlambda^2."""
+        z = x * x if self.squared else x
+        # d(x'^2) / dz
+        half: Array = np.zeros_like(z)
+        for power in range(len(self.rates) - 1, 0, -1):
+            half = half * z + power * self.rates[power]
+        if not self.squared:
+            return 0.5 * self.sign * self.unit * half
+        bend: Array = 2.0 * self.sign * self.unit * (self.speed(x) ** 2 + z * half)
+        return bend
+
     def speed(self, x: Array) -> Array:
         """Return dx / dlambda."""
         z = x * x if self.squared else x
@@ -111,27 +141,39 @@ class RadialPath:
         speed: Array = np.sqrt(np.maximum(square, 0.0))
         return speed
 
-    def turn_rate(self, x: Array) -> Array:
-        """Return dpsi / dlambda."""
+    def turn_rate(self, x: Array, speed: Array) -> Array:
+        """Return dpsi / dlambda, without the winding of `wound`; `speed` is dx / dlambda."""
         u, a = self.u(x), self.spin
-        outer = horizon_radius(a)
-        # (1 - r_+ u)(1 - r_- u) keeps its digits at the horizon
-        below = (1.0 - outer * u) * (1.0 - (a * a / outer) * u)
-        rate: Array = a * u * (a * self.b * u - 2.0) / below
+        if self.wound == 0.0:
+            plain: Array = a * u * (a * self.b * u - 2.0) / self._delta(u)
+            return plain
+        slope = self.unit * speed * (2.0 * np.abs(x) if self.squared else 1.0)
+        p = 1.0 + a * (a - self.b) * u * u
+        rate: Array = a - a * self.drag * u * u / (p + slope)
+        if self.squared:
+            # before the turning point the ray goes out
+            rate = np.where(x < 0.0, a - a * (p + slope) / self._delta(u), rate)
         return rate
 
-    def poles(self) -> list[tuple[Array, Array]]:
-        """Return places x_p and weights c of the poles c dx / (x_p - x) of psi, to be taken out of it."""
-        if self.squared and self.sign < 0.0:
-            return []  # behind the inner turning point: beyond a branch point, and far
-        a, outer = self.spin, horizon_radius(self.spin)
-        inner = a * a / outer
-        found = []
-        for radius, weight in ((outer, -a), (inner, a)):
-            residue = np.sign(2.0 * radius - a * self.b) * (weight / (outer - inner))
-            place = self.sign * (1.0 / (radius * self.unit) - 1.0)
-            found.append((np.sqrt(np.maximum(place, 0.0)) if self.squared else place, residue * self.sign))
-        return found
+    def _delta(self, u: Array) -> Array:
+        """Return u^2 Delta = 1 - 2 u + a^2 u^2, which keeps its digits at the horizon in this form."""
+        outer = horizon_radius(self.spin)
+        delta: Array = (1.0 - outer * u) * (1.0 - (self.spin * self.spin / outer) * u)
+        return delta
+
+    @property
+    def wound(self) -> float:
+        """How many times W is taken out of psi: 1 for rays that end at the horizon, -1 for those straight out."""
+        return 0.0 if self.squared and self.sign < 0.0 else self.sign
+
+
+def winding(spin: float, u: NDArray[Any]) -> NDArray[Any]:
+    """Return W(u), what the azimuth of a ray winds up by on its way into the horizon, for u < 1 / r_+."""
+    outer = horizon_radius(spin)
+    inner = spin * spin / outer
+    wound: NDArray[Any] = np.log((1.0 - outer * u) / (1.0 - inner * u))
+    wound *= spin / (outer - inner)
+    return wound
 
 
 def paths_of(rays: Rays, barrier: Barrier) -> list[tuple[Index, RadialPath]]:
@@ -153,58 +195,66 @@ def paths_of(rays: Rays, barrier: Barrier) -> list[tuple[Index, RadialPath]]:
 
 
 def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPath:
-    u_end = 1.0 / (horizon_radius(rays.spin) * HORIZON_MARGIN)
+    a = rays.spin
+    pace = np.sqrt(np.maximum(rays.carter + a * a, 0.0))
+    drag = rays.carter + a * (a - 2.0 * rays.b)
     with np.errstate(divide="ignore", invalid="ignore"):
+        root = negative_root(rays)
         if squared:
             start, unit, rates = (turning_polynomial if sign < 0.0 else inner_turning_polynomial)(rays, barrier)
-            end = np.ones(len(rays)) if sign < 0.0 else np.sqrt(np.maximum(u_end / unit - 1.0, 0.0))
             g0, g1, g2 = rates[:3]
-            root = np.sqrt(np.maximum(g1 * g1 - 4.0 * g0 * g2, 0.0))
-            near = np.sqrt(np.where(g1 > 0.0, 2.0 * g0 / (g1 + root), np.inf))
+            discriminant = np.sqrt(np.maximum(g1 * g1 - 4.0 * g0 * g2, 0.0))
+            near = np.sqrt(np.where(g1 > 0.0, 2.0 * g0 / (g1 + discriminant), np.inf))
         else:
             start, unit, rates = direct_polynomial(rays, barrier, inward=sign > 0.0)
             if sign > 0.0:
                 start = -start
                 rates[1::2] *= -1.0
-            end = np.ones(len(rays)) if sign < 0.0 else u_end / unit - 1.0
             near = np.sqrt(np.where(rates[2] > 0.0, rates[0] / rates[2], np.inf))
-    pace = np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0))
-    negative = negative_root(rays) / unit
-    far = np.sqrt(1.0 + negative) if squared else 1.0 + negative
-    return RadialPath(rays.spin, squared, sign, rays.b, rates, unit, start, end, far, near, pace)
+        u_end = -BEYOND * root if sign < 0.0 else _beyond_horizon(a)
+        end = sign * (u_end / unit - 1.0)
+        far = 1.0 + root / unit
+        if squared:
+            end, far = np.sqrt(np.maximum(end, 0.0)), np.sqrt(far)
+    return RadialPath(a, squared, sign, rays.b, drag, rates, unit, start, end, far, near, pace)
+
+
+def _beyond_horizon(spin: float) -> float:
+    """Return u where paths through the horizon end, before the inner one."""
+    outer = 1.0 / horizon_radius(spin)
+    inner = 1.0 / (spin * spin * outer) if spin else math.inf
+    return min(outer + BEYOND * (inner - outer), MOST_BEYOND * outer)
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where rays are at Mino times asked for, shape (k, n); NaN after a ray's end unless asked to go on beyond."""
+    """Where rays are at Mino times asked for, shape (k, n), beyond their ends as well: u <= 0 or 1 / u <= r_+."""
 
     u: Array
     u_slope: Array
     """du / dlambda along the ray backwards."""
-    psi: Array
-    duration: Array
-    """Mino time of the whole way, shape (n,)."""
+    unwound: Array
+    """psi - W(u): regular at the horizon."""
     resolved: Mask
     """Shape (n,)."""
 
     @classmethod
     def empty(cls, times: int, count: int) -> Places:
         """Return places that are all unknown."""
-        u, u_slope, psi = (np.full((times, count), np.nan) for _ in range(3))
-        return cls(u, u_slope, psi, np.full(count, np.nan), np.zeros(count, dtype=bool))
+        u, u_slope, unwound = (np.full((times, count), np.nan) for _ in range(3))
+        return cls(u, u_slope, unwound, np.zeros(count, dtype=bool))
 
     def put(self, index: Index, other: Places) -> None:
         """Take over what `other` knows of the rays of `index`."""
-        for name in ("u", "u_slope", "psi"):
+        for name in ("u", "u_slope", "unwound"):
             getattr(self, name)[:, index] = getattr(other, name)
-        self.duration[index], self.resolved[index] = other.duration, other.resolved
+        self.resolved[index] = other.resolved
 
 
-def places(path: RadialPath, times: Array, tolerance: float, beyond: bool = False) -> Places:
+def places(path: RadialPath, times: Array, tolerance: float) -> Places:
     """Return where rays are at Mino times of shape (k, n), NaN for none, with an error of `tolerance` radians.
 
-    Where `beyond` is set, rays go on after their end along their last tangent, so that u passes through its last value
-    smoothly.
+    Beyond the end of their path, which is beyond their own, rays go on along its last parabola to the vertex.
     """
     count = len(path.b)
     found = Places.empty(len(times), count)
@@ -213,7 +263,7 @@ def places(path: RadialPath, times: Array, tolerance: float, beyond: bool = Fals
         failed = []
         for start in range(0, len(waiting), CHUNK):
             index = waiting[start : start + CHUNK]
-            part = _Series(path.select(index), points).places(times[:, index], tolerance, beyond)
+            part = _Series(path.select(index), points).places(times[:, index], tolerance)
             found.put(index, part)
             failed.append(index[~part.resolved])
         waiting = np.concatenate(failed) if failed else waiting
@@ -273,16 +323,14 @@ class _Series:
                 np.where(self.stretched, np.arcsinh((t - self.centre) / self.scale), t) for t in (low, high)
             )
             self.half, self.middle = 0.5 * (high - low), 0.5 * (high + low)
-            self.poles = path.poles() if path.spin != 0.0 else []
             x, step = self.place(points[:, None])
-            values = step / path.speed(x)
+            speed = path.speed(x)
+            values = step / speed
             self.time_tail = np.abs(_product(self.to_tail, values)).sum(axis=0)
             self.time_series, self.time_at_points = _product(to_integral, values), _product(at_points, values)
             self.duration = self.time_series.sum(axis=0)
             if path.spin != 0.0:
-                values *= path.turn_rate(x)
-                for place, residue in self.poles:
-                    values -= self._pole(x, place, residue) * step
+                values *= path.turn_rate(x, speed)
                 self.psi_tail = np.abs(_product(self.to_tail, values)).sum(axis=0)
                 self.psi_series = _product(to_integral, values)
 
@@ -322,42 +370,30 @@ class _Series:
         t: Array = share / (1.0 + np.sqrt(1.0 - share * share))
         return t
 
-    def _pole(self, x: Array, place: Array, residue: Array) -> Array:
-        if self.path.squared:
-            residue = 2.0 * place * residue / (place + x)
-        density: Array = residue / (place - x)
-        return density
-
-    def _pole_integral(self, x: Array, place: Array, residue: Array) -> Array:
-        start = self.path.start
-        whole = np.log1p((x - start) / (place - x))
-        if self.path.squared:
-            whole += np.log1p((x - start) / (place + start))
-        integral: Array = residue * whole
-        return integral
-
     def select(self, chosen: Index) -> _Series:
         """Return the series of the chosen rays alone, for `place` and `sums`."""
         part = object.__new__(_Series)
         part.path = self.path.select(chosen)
         for name in ("half", "middle", "centre", "scale", "stretched"):
             setattr(part, name, getattr(self, name)[chosen])
-        part.poles = [(place[chosen], residue[chosen]) for place, residue in self.poles]
         part.time_series = self.time_series[:, chosen]
         if self.path.spin != 0.0:
             part.psi_series = self.psi_series[:, chosen]
         return part
 
-    def psi(self, x: Array, z: Array) -> Array:
-        """Return psi from the camera to x."""
-        if self.path.spin == 0.0:
-            return np.zeros_like(x)
+    def unwound(self, u: Array, z: Array) -> Array:
+        """Return psi - W(u) at z, where u is `u`."""
+        path = self.path
+        if path.spin == 0.0:
+            return np.zeros_like(u)
         total = _clenshaw(self.psi_series, z)
-        for place, residue in self.poles:
-            total += self._pole_integral(x, place, residue)
+        if path.wound != 0.0:
+            total -= path.wound * winding(path.spin, path.u(path.start))
+        if path.wound != 1.0:
+            total += (path.wound - 1.0) * winding(path.spin, u)
         return total
 
-    def places(self, times: Array, tolerance: float, beyond: bool) -> Places:
+    def places(self, times: Array, tolerance: float) -> Places:
         """Return where the rays are; `resolved` only where the series have converged."""
         path = self.path
         with np.errstate(all="ignore"):
@@ -370,20 +406,25 @@ class _Series:
             resolved |= (first > self.duration + ENDED_MARGIN * self.time_tail) & (error < ENDED_ERROR)
             resolved &= np.isfinite(self.duration)
             found = Places.empty(*times.shape)
-            found.duration[:], found.resolved[:] = self.duration, resolved
+            found.resolved[:] = resolved
             order, ray = np.nonzero((times < self.duration) & resolved)
             if len(ray):
                 series, wanted = self.select(ray), times[order, ray]
                 z = self._invert(series, ray, wanted, LAST_CHANGE * tolerance**0.5)
                 x, _ = series.place(z)
-                found.u[order, ray], found.u_slope[order, ray] = series.path.u(x), series.path.u_slope(x)
-                found.psi[order, ray] = series.psi(x, z)
-            if beyond:
-                late = (times >= self.duration) & resolved
-                slope = path.u_slope(path.end)
-                np.copyto(found.u, path.u(path.end) + slope * (times - self.duration), where=late)
-                np.copyto(found.u_slope, slope, where=late)
-                np.copyto(found.psi, self.psi(path.end, np.ones_like(path.end)), where=late)
+                u = series.path.u(x)
+                found.u[order, ray], found.u_slope[order, ray] = u, series.path.u_slope(x)
+                found.unwound[order, ray] = series.unwound(u, z)
+            order, ray = np.nonzero((times >= self.duration) & resolved)
+            if len(ray):
+                series, late = self.select(ray), times[order, ray] - self.duration[ray]
+                end = series.path.end
+                u, slope, bend = series.path.u(end), series.path.u_slope(end), series.path.u_bend(end)
+                # no further than the parabola's vertex, or u would come back
+                late = np.where(slope * bend < 0.0, np.minimum(late, -slope / bend), late)
+                found.u[order, ray] = u + late * (slope + 0.5 * late * bend)
+                found.u_slope[order, ray] = slope + late * bend
+                found.unwound[order, ray] = series.unwound(u, np.ones_like(end))
         return found
 
     def _invert(self, series: _Series, ray: Index, times: Array, last_change: float) -> Array:
@@ -414,9 +455,9 @@ def _clenshaw(series: Array, z: Array) -> Array:
     return total
 
 
-def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float, beyond: bool = False) -> Places:
+def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float) -> Places:
     """Return where rays of any kind are at Mino times of shape (k, n); see `places`."""
     found = Places.empty(len(times), len(rays))
     for index, path in paths_of(rays, barrier):
-        found.put(index, places(path, times[:, index], tolerance, beyond))
+        found.put(index, places(path, times[:, index], tolerance))
     return found

@@ -104,12 +104,8 @@ class SkyTable:
         `light`, shape (3, n), is where it runs in the FIDO's frame, on (r-hat, theta-hat, phi-hat), at azimuth `phi`.
         NaN where the table has no answer: in the shadow, next to its edge, and where interpolation is not good enough.
         """
-        outward, aside, up = light
-        away = np.arctan2(np.sqrt(aside * aside + up * up), outward)
-        angle = np.arctan2(-up, -aside) * (ANGLES / (2.0 * math.pi))
-        angle += (angle < 0.0) * float(ANGLES)
-        row = np.minimum(angle.astype(np.intp), ANGLES - 1)
-        across = _weights(angle - row, AROUND)
+        away, row, part = position_angles(light, ANGLES)
+        across = lagrange_weights(part, AROUND)
         edge = sum(weight * self._edge.take(row + i) for i, weight in enumerate(across))
         delta = away - edge
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -117,7 +113,7 @@ class SkyTable:
         inside = place >= 0.0
         place = np.where(inside, place, 0.0)
         column = np.minimum(place.astype(np.intp), self._count - len(ALONG))
-        along = _weights(place - column, ALONG)
+        along = lagrange_weights(place - column, ALONG)
         result = np.zeros((3, len(away)))
         for i, weight in enumerate(across):
             first = (row + i) * self._count + column
@@ -172,7 +168,18 @@ def _served(values: Array, edge: Array, delta: Array, error: float) -> NDArray[n
     return good
 
 
-def _weights(part: Array, points: tuple[int, ...]) -> list[Array]:
+def position_angles(light: Array, count: int) -> tuple[Array, NDArray[np.intp], Array]:
+    """Return how far from the hole's direction a FIDO sees light, radians, and its position angle there, in steps of
+    a circle divided by `count`: whole ones and the part left; for `light` see `SkyTable.directions`."""
+    outward, aside, up = light
+    away: Array = np.arctan2(np.sqrt(aside * aside + up * up), outward)
+    angle = np.arctan2(-up, -aside) * (count / (2.0 * math.pi))
+    angle += (angle < 0.0) * float(count)
+    whole = np.minimum(angle.astype(np.intp), count - 1)
+    return away, whole, angle - whole
+
+
+def lagrange_weights(part: Array, points: tuple[int, ...]) -> list[Array]:
     """Return the weights of Lagrange's interpolation among points at whole numbers, for places between 0 and 1."""
     weights = []
     for point in points:

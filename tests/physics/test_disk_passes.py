@@ -22,6 +22,7 @@ from physics import (
     write_warp_map,
 )
 from physics.annulus import share_above
+from physics.radial_path import winding
 from physics.view import View
 
 DISK = Disk()
@@ -88,7 +89,8 @@ def test_passes_are_those_of_rays_traced_everywhere(name):
         whole = (share == 1.0) & (counted[order] == 1.0)
         if whole.sum() > 20:
             radius = np.abs(one.radius[rows, columns] * centre.u[order] - 1.0)[whole]
-            turn = np.abs((one.phi[rows, columns] - centre.phi[order] + math.pi) % (2 * math.pi) - math.pi)[whole]
+            phi = centre.unwound[order][whole] + winding(parameters.spin, centre.u[order][whole])
+            turn = np.abs((one.phi[rows, columns][whole] - phi + math.pi) % (2 * math.pi) - math.pi)
             shift = np.abs(one.g[rows, columns] / g[order] - 1.0)[whole]
             # 2e-4 is promised where the image is not crowded.
             assert np.median(radius) < 2e-4
