@@ -8,6 +8,7 @@ import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 from pages import ROOT
 
@@ -22,6 +23,9 @@ BLENDER_OPTIONS = {
 }
 # `blender --command extension install-file`, from its --help.
 EXTENSION_OPTIONS = {"-r": 1, "--repo": 1, "-e": 0, "--enable": 0, "-s": 0, "--sync": 0, "--no-prefs": 0}
+# What `openjd` takes, from its --help.
+OPENJD_COMMANDS = {"check", "summary", "run"}
+OPENJD_OPTIONS = {"-p": 1, "--job-param": 1, "--step": 1, "--tasks": 1, "--run-dependencies": 0, "--maximum-tasks": 1}
 SMALL = ("--width", "32", "--height", "18")
 _ASSIGNMENT = re.compile(r"\w+=\S*")
 
@@ -49,16 +53,23 @@ def _split(words: list[str]) -> list[list[str]]:
     return parts
 
 
-def check(words: list[str], run_in_blender: Callable[[str], None]) -> None:
-    """Run a command where that is possible in this folder, and else compare it with what it calls.
+class Blender(Protocol):
+    """What a line that calls Blender is tried with."""
 
-    Python that Blender is given is handed to `run_in_blender`.
-    """
+    def run(self, code: str) -> None:
+        """Run Python that is given on the line, in a small scene with a hole."""
+
+    def parse(self, words: list[str]) -> None:
+        """Have the add-on's own command parse its words; SystemExit where they are wrong."""
+
+
+def check(words: list[str], blender: Blender) -> None:
+    """Run a command where that is possible in this folder, and else compare it with what it calls."""
     program = os.path.basename(words[0])
     if re.fullmatch(r"python(3(\.\d+)?)?", program):
         _check_python(words[1:])
     elif program in CHECKS:
-        CHECKS[program](words[1:], run_in_blender)
+        CHECKS[program](words[1:], blender)
     else:
         raise AssertionError(f"nothing knows how to check the command {words[0]}")
 
@@ -75,43 +86,68 @@ def _check_python(words: list[str]) -> None:
             assert f'"{word.split("=")[0]}"' in source, f"{script} has no option {word}"
 
 
-def _check_make(words: list[str], _run: Callable[[str], None]) -> None:
+def _check_make(words: list[str], _blender: Blender) -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for word in words:
         if not _ASSIGNMENT.fullmatch(word):
             assert re.search(rf"^{re.escape(word)}:", makefile, re.MULTILINE), f"make has no target {word}"
 
 
-def _check_blender(words: list[str], run: Callable[[str], None]) -> None:
+def _check_blender(words: list[str], blender: Blender) -> None:
     rest = list(words)
     while rest:
         word = rest.pop(0)
         if word in ("-c", "--command"):
-            _check_blender_command(rest)
+            _check_blender_command(rest, blender)
             return
         if word == "--":
             return
         if not word.startswith("-"):
             assert word == "FILE" or Path(word).suffix == ".blend", f"{word} is neither an option nor a file"
             continue
-        assert word in BLENDER_OPTIONS, f"Blender has no option {word}"
-        values, rest = rest[: BLENDER_OPTIONS[word]], rest[BLENDER_OPTIONS[word] :]
-        assert len(values) == BLENDER_OPTIONS[word], f"{word} takes a value"
-        if word == "--python-expr":
-            run(values[0])
+        rest.insert(0, word)
+        option, values, rest = _option(rest, BLENDER_OPTIONS, "Blender")
+        if option == "--python-expr":
+            blender.run(values[0])
 
 
-def _check_blender_command(words: list[str]) -> None:
+def _check_blender_command(words: list[str], blender: Blender) -> None:
+    if words[0] == "umbra":
+        try:
+            blender.parse(words[1:])
+        except SystemExit as end:
+            if end.code:
+                raise AssertionError(f"-c {' '.join(words)} is wrong usage") from end
+        return
     assert words[:2] == ["extension", "install-file"], f"nothing knows how to check --command {words[0]}"
-    rest = words[2:]
+    _check_options(words[2:], EXTENSION_OPTIONS, "extension install-file")
+
+
+def _check_openjd(words: list[str], _blender: Blender) -> None:
+    assert words[0] in OPENJD_COMMANDS, f"openjd has no command {words[0]}"
+    _check_options(words[1:], OPENJD_OPTIONS, "openjd")
+
+
+def _check_options(words: list[str], known: dict[str, int], program: str) -> None:
+    rest = list(words)
     while rest:
-        word = rest.pop(0)
-        if word.startswith("-"):
-            assert word in EXTENSION_OPTIONS, f"extension install-file has no option {word}"
-            del rest[: EXTENSION_OPTIONS[word]]
+        if rest[0].startswith("-"):
+            _name, _values, rest = _option(rest, known, program)
+        else:
+            rest = rest[1:]
 
 
-CHECKS: dict[str, Callable[[list[str], Callable[[str], None]], None]] = {
+def _option(words: list[str], known: dict[str, int], program: str) -> tuple[str, list[str], list[str]]:
+    """The option that the words begin with, its values and the words after it."""
+    name = words[0]
+    assert name in known, f"{program} has no option {name}"
+    values, rest = words[1 : 1 + known[name]], words[1 + known[name] :]
+    assert len(values) == known[name], f"{name} takes a value"
+    return name, values, rest
+
+
+CHECKS: dict[str, Callable[[list[str], Blender], None]] = {
     "make": _check_make,
     "blender": _check_blender,
+    "openjd": _check_openjd,
 }
