@@ -94,7 +94,7 @@ class RingTable:
         self._edge, self._scale = coordinates.edge[around], coordinates.scale[around]
         self._step = (coordinates.range * (coordinates.s[1] - coordinates.s[0]))[around]
         self._first = 2.0 + coordinates.s[0] / (coordinates.s[1] - coordinates.s[0])
-        self._columns = channels[0].shape[1]
+        self._columns = int(channels[0].shape[1])
         self._channels = [np.ascontiguousarray(each).ravel() for each in channels]
 
     @property
@@ -173,8 +173,9 @@ def _scale(u: Array, edge: Array, needs: Needs) -> Array:
     half = len(SHARES)
     inside, outside = u[:, :half][:, ::-1], u[:, half:]  # from the edge away
     change = np.fmax(np.abs(inside - inside[:, :1]), np.abs(outside - outside[:, :1]))
-    first = (np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner).argmax(axis=1)
-    scale: Array = SHARES[::-1][first] * edge
+    changed = np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner
+    changed[:, -1] = True  # where nothing crowds, the largest will do
+    scale: Array = SHARES[::-1][changed.argmax(axis=1)] * edge
     return scale
 
 
@@ -205,6 +206,13 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
     step = grid.range * (grid.s[1] - grid.s[0])
     along = needs.pixel / (step[wide, None] * np.hypot(grid.scale[wide, None], grid.delta[wide]))
     across = needs.pixel * angles / (2.0 * math.pi * np.maximum(np.sin(away), needs.pixel))
+    # What the coordinates lose between angles, in steps of s.
+    lost_edge, lost_scale, lost_step = (
+        AROUND_ERROR * np.abs(np.diff(each[np.arange(-4, angles + 5) % angles], 4))[:, None]
+        for each in (grid.edge, grid.scale, step)
+    )
+    stray = along / needs.pixel * (lost_edge + lost_scale * np.abs(np.sinh(grid.range[wide, None] * grid.s)))
+    stray += lost_step / step[wide, None] * np.abs(grid.s / (grid.s[1] - grid.s[0]))
     good = np.ones(u.shape, dtype=bool)
     for each, small in ((u, needs.place_error / needs.outer), (azimuth, needs.place_error)):
         error = np.zeros_like(each)
@@ -213,6 +221,7 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
             padded = np.pad(left_out, [(2, 2) if i == axis else (0, 0) for i in (0, 1)], mode="edge")
             error = np.maximum(error, padded)
         change = np.gradient(each, axis=1), np.gradient(each, axis=0)
+        error += stray * np.abs(change[0])
         good &= error < np.maximum(needs.pixel_error * np.hypot(change[0] * along, change[1] * across), small)
         if each is u:
             # Off the disk, and so are all places around.

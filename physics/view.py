@@ -46,6 +46,7 @@ class View:
         self._observer = parameters.observer()
         triad = spherical_triad(self._observer.theta, self._observer.phi)
         self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
+        self._camera_to_motion = self._camera_to_triad @ camera_triad(self._observer).T
         self.hole_to_world = np.array(parameters.hole_to_world)
         self.phi = self._observer.phi
         """The camera's azimuth about the spin axis, radians."""
@@ -90,9 +91,8 @@ class View:
         They go on smoothly beyond the rays' ends, see `crossings.Crossings`; for `wanted` see `disk_crossings`.
         """
         seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
-        looking = seen @ self._camera_to_triad @ camera_triad(self._observer).T
         return disk_crossings(
-            self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted
+            self._spin, self._observer, seen @ self._camera_to_motion, count, tolerance, method, beyond=True, wanted=wanted
         )
 
     def places_in_plane(self, radii: Array, azimuths: Array) -> tuple[Array, Array]:

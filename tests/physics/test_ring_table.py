@@ -25,6 +25,7 @@ CAMERAS = {
     "extreme spin close up": {"spin": 0.999, "radius": 10.0, "fov": 60.0},
     "over the pole": {"spin": 0.7, "radius": 20.0, "inclination": 25.0},
     "without spin": {"spin": 0.0, "radius": 15.0, "inclination": 70.0},
+    "from within the plane": {"spin": 0.7, "radius": 20.0, "fov": 70.0, "inclination": 90.0},
     "the other way round": {"spin": -0.8, "radius": 25.0},
 }
 
