@@ -20,12 +20,9 @@ from numpy.typing import NDArray
 
 from .annulus import coverage, near_annulus, nearest_covered
 from .disk_pass import DiskPass
-from .metric import isco_radius
-from .orbiting_matter import circular_redshift, redshift_factor
+from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, U, nearest_turn
 from .painting import wrapped
-from .radial_path import winding
 from .rays import Array
-from .ring_table import Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
 from .tiles import (
     TAIL,
@@ -38,40 +35,25 @@ from .tiles import (
     sides_for,
     tiles_of,
 )
-from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
+from .tracer import BLOCK_SIZE
 from .view import View
 
 Mask = NDArray[np.bool_]
 Image = NDArray[np.float32]
 
-# Error of place on the disk, relative, for each radian of error of direction that is allowed.
-PLACE_ERROR = 40.0
 # Chebyshev points along each side of a tile: the sky, which has to be better known, has more.
 DISK_POINTS = 8
-# Rays need be better than that by this only.
-TRACING_SHARE = 0.1
-# Where the image is crowded, this share of the way from pixel to pixel will do.
-PIXEL_ERROR = 0.03
 
 # A tile is empty if its samples stay off the disk by this many times what they may be wrong by.
 EMPTY_MARGIN = 4.0
 
-# The side of the tiles from which on tables serve the later images, if their tiles would ask for this many rays, each
-# of them in so many rounds.
-TABLE_SIDE = 32
-WORTHWHILE_RAYS = 12_000
-TABLE_ROUNDS = 3
-# A table is made of this share of them.
-TABLE_SHARE = 0.35
-# Outside of this radius there are no rays of negative energy, at any latitude.
-ERGOSPHERE = 2.0
-
 # Chebyshev coefficients looked up at a time for single pixels at a rim.
 GROUP_VALUES = 1 << 20
 
-# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far: for samples
-# that must stay smooth, and for differences between pixels.
-LOWEST_U, HIGHEST_U = -30.0, 20.0
+# The side of the tiles from which on tables serve the later images, and the rounds that their tiles ask for samples in.
+TABLE_SIDE, TABLE_ROUNDS = 64, 6
+
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter for differences between pixels.
 LOWEST_STEP, HIGHEST_STEP = -2.0, 4.0
 
 # Places along each side of a pixel that is divided.
@@ -86,14 +68,6 @@ MARKED_CIRCLES, MARKED_PLACES = 8, 256
 # Pixels below which the spread of these places, across where it is least, makes a slim disk.
 SLIM = 8.0
 
-# Channels of what is interpolated: 1 / r, the unwound azimuth, energy and angular momentum of the light for a camera
-# energy of 1, and where matter falls du / dlambda on the same scale.
-U, PHI, ENERGY, MOMENTUM, SLOPE = range(5)
-
-# A disk that reaches inside the ISCO by less than this share of its radius does not.
-AT_ISCO = 1e-9
-
-
 class DiskPainting:
     """The passes of a disk in the making."""
 
@@ -102,22 +76,18 @@ class DiskPainting:
         self._parameters = parameters
         self._disk = parameters.disk
         self._inner, self._outer = self._disk.radii(parameters.spin)
-        isco = isco_radius(parameters.spin, prograde=not self._disk.retrograde)
-        self._falls = self._inner < isco * (1.0 - AT_ISCO)
-        self._channels = SLOPE + 1 if self._falls else SLOPE
-        self._tolerance = max(parameters.tolerance, TRACING_SHARE * PLACE_ERROR * parameters.interpolation)
         self._view = View(parameters)
+        self._samples = DiskSamples(parameters, self._view)
+        self._channels = self._samples.channels
         self._width, self._height = parameters.map_size
         self._planes = np.zeros((self._disk.crossings, 4, self._height, self._width), np.float32)
         # Pixels that samples of their tile say are far from the disk, by crossing.
         self._far = np.zeros((self._disk.crossings, self._height, self._width), dtype=bool)
         self._unresolved = np.zeros((self._height, self._width), dtype=bool)
-        self._rays = 0
-        self._tables: dict[int, RingTable] = {}
 
     def counts(self) -> dict[str, int]:
         """Number of rays that were traced for the passes, and of pixels whose ray was given up."""
-        return {"disk_rays": self._rays, "disk_unresolved": int(np.count_nonzero(self._unresolved))}
+        return {"disk_rays": self._samples.rays, "disk_unresolved": int(np.count_nonzero(self._unresolved))}
 
     def passes(self, metadata: dict[str, object]) -> tuple[DiskPass, ...]:
         """Return the passes in order."""
@@ -134,68 +104,6 @@ class DiskPainting:
             tiles = tiles_of(self._width, self._height, TILE_SIDES[-1])
             yield from self._trace(tiles, np.ones((len(tiles), self._disk.crossings), dtype=bool), 0.0)
 
-    # --- samples -----------------------------------------------------------------------------------
-
-    def _sample(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
-        """Return the channels, shape (crossings, channels, n), and which rays were given up, (n,).
-
-        Only what is `wanted`, shape (crossings, n), means anything; the others' u is NaN.
-
-        u is finite everywhere: rays that never cross count as far beyond their end.
-        """
-        if not self._tables:
-            return self._trace_rays(x, y, wanted)
-        values, lost = np.full((self._disk.crossings, self._channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
-        asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
-        rays, light = self._view.rays(x[asked], y[asked]), self._view.light(x[asked], y[asked])
-        left = wanted.copy()
-        for order, table in self._tables.items():
-            here = np.flatnonzero(wanted[order, asked])
-            place = table.places(light[:, here], 3 if self._falls else 2)
-            known = np.isfinite(place[0])
-            here, place = here[known], place[:, known]
-            left[order, asked[here]] = False
-            one_plus_z = rays.one_plus_z[here]
-            found = [self._clipped(place[0]), place[1], one_plus_z, rays.b[here] * one_plus_z]
-            if self._falls:
-                found.append(place[2] * one_plus_z)
-            values[order, :, asked[here]] = np.stack(found, axis=1)
-        traced = np.flatnonzero(left.any(axis=0))
-        part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
-        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
-        return values, lost
-
-    def _clipped(self, u: Array) -> Array:
-        clipped: Array = np.clip(u, LOWEST_U / self._outer, HIGHEST_U / self._inner)
-        return clipped
-
-    def _trace_rays(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
-        """Do what `_sample` does, a ray for each place."""
-        values = np.empty((self._disk.crossings, self._channels, len(x)))
-        lost = np.zeros(len(x), dtype=bool)
-        for start in range(0, len(x), BLOCK_SIZE):
-            block = slice(start, start + BLOCK_SIZE)
-            found, light = self._view.crossings(
-                x[block],
-                y[block],
-                self._disk.crossings,
-                self._tolerance,
-                self._parameters.method,
-                wanted[:, block],
-            )
-            low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
-            nowhere = np.where(found.fate == Fate.SHADOW, high, low)
-            u = self._clipped(np.where(np.isnan(found.u), nowhere, found.u))
-            values[:, U, block] = np.where(wanted[:, block], u, np.nan)
-            values[:, PHI, block] = np.nan_to_num(found.unwound)
-            values[:, ENERGY, block] = light.energy / light.camera_energy
-            values[:, MOMENTUM, block] = light.b / light.camera_energy
-            if self._falls:
-                values[:, SLOPE, block] = np.nan_to_num(found.u_slope / light.camera_energy)
-            lost[block] = found.fate == Fate.UNRESOLVED
-        self._rays += len(x)
-        return values, lost
-
     # --- adaptive ----------------------------------------------------------------------------------
 
     def _adaptive(self) -> Generator[float, None, None]:
@@ -207,7 +115,7 @@ class DiskPainting:
         for side in sides:
             marked = self._marked(waiting, marked_x, marked_y)
             if side == TABLE_SIDE:
-                self._make_tables(wanted)
+                self._samples.make_tables(np.count_nonzero(wanted, axis=0) * (TABLE_ROUNDS * DISK_POINTS**2))
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
@@ -222,25 +130,6 @@ class DiskPainting:
                 inside = (waiting.column < self._width) & (waiting.row < self._height)
                 waiting, wanted = waiting.select(inside), wanted[inside]
         yield from self._trace(waiting, wanted, done)
-
-    def _make_tables(self, wanted: Mask) -> None:
-        """Make tables of the later images that still ask for many rays; `wanted`: by tile and crossing."""
-        rays = np.count_nonzero(wanted, axis=0) * (TABLE_ROUNDS * DISK_POINTS**2)
-        orders = {k: TABLE_SHARE * rays[k] for k in range(1, self._disk.crossings) if rays[k] > WORTHWHILE_RAYS}
-        observer = self._parameters.observer()
-        stepping = self._parameters.method != DEFAULT_METHOD
-        if not orders or stepping or observer.r < ERGOSPHERE:
-            return
-        needs = Needs(
-            self._inner,
-            self._outer,
-            self._tolerance,
-            self._parameters.pixel_angle,
-            PIXEL_ERROR,
-            PLACE_ERROR * self._parameters.interpolation,
-        )
-        self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
-        self._rays += sum(table.rays for table in self._tables.values())
 
     def _marked_places(self) -> tuple[Array, Array]:
         """Return pixel coordinates of the hole's centre and, if it is slim, on the disk as flat space would show it.
@@ -270,7 +159,7 @@ class DiskPainting:
     def _settle(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
         """Sample tiles, fill what they determine and strike it from `wanted`, whose rows `part` they are."""
         x, y = sample_places(tiles, DISK_POINTS)
-        values, lost = self._sample(x, y, np.repeat(wanted[part].T, DISK_POINTS**2, axis=1))
+        values, lost = self._samples.at(x, y, np.repeat(wanted[part].T, DISK_POINTS**2, axis=1))
         values = values.reshape(*values.shape[:2], len(tiles), DISK_POINTS, DISK_POINTS)
         broken = lost.reshape(len(tiles), -1).any(axis=1)
         allowed = PLACE_ERROR * self._parameters.interpolation
@@ -290,7 +179,7 @@ class DiskPainting:
             along = np.maximum(pixel[:, U], allowed / self._outer)
             empty = (off > EMPTY_MARGIN * tail[:, U]) & (~marked[chosen] | (TAIL_SHARE * tail[:, U] < along))
             good = (TAIL_SHARE * tail[:, U] < along) & (TAIL_SHARE * tail[:, PHI] < np.maximum(pixel[:, PHI], allowed))
-            if self._falls:
+            if self._channels > SLOPE:
                 good &= TAIL_SHARE * tail[:, SLOPE] < np.maximum(pixel[:, SLOPE], allowed)
             good &= ~empty
             if good.any():
@@ -343,7 +232,7 @@ class DiskPainting:
         here = np.einsum("ncj,nj->cn", np.einsum("ni,ncij->ncj", upright, coefficients[tile]), along)
         here[U] = met
         place = (tiles.column[tile] + column, tiles.row[tile] + row)
-        self._write(order, place, self._matter(here), share)
+        self._write(order, place, self._samples.matter(here), share)
 
     def _partly_covered(
         self, tiles: Tiles, coefficients: NDArray[Any], near: Mask, covered: Mask
@@ -374,26 +263,12 @@ class DiskPainting:
 
     def _write_tiles(self, order: int, tiles: Tiles, values: NDArray[Any], covered: Mask | None) -> None:
         """Write tiles from channels of shape (n, channels, side, side), where they are wholly covered: None for all."""
-        radius, phi, g = self._matter(np.moveaxis(values, 1, 0))
+        radius, phi, g = self._samples.matter(np.moveaxis(values, 1, 0))
         share = np.ones_like(radius) if covered is None else covered.astype(radius.dtype)
         for plane, channel in zip(self._planes[order], (radius, phi, g, share), strict=True):
             if covered is not None:
                 channel *= covered
             tiles.put(plane, channel)
-
-    def _matter(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
-        u, spin, retrograde = values[U], self._parameters.spin, self._disk.retrograde
-        phi = values[PHI] + winding(spin, u)
-        turn = phi.dtype.type(2.0 * math.pi)
-        phi -= turn * np.floor(phi * (1.0 / turn))
-        radius = 1.0 / u
-        if self._falls:
-            radial = values[SLOPE] / (u * u)
-            g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
-        else:
-            g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)
-        return radius, wrapped(phi), g
 
     def _write(
         self,
@@ -427,7 +302,7 @@ class DiskPainting:
         traced: Mask = every.any(axis=0)
         values = np.full((self._disk.crossings, self._channels, *shape), np.nan)
         x, y = columns[traced].astype(np.float64) + 0.5, rows[traced].astype(np.float64) + 0.5
-        values[:, :, traced], lost = self._sample(x, y, every[:, traced])
+        values[:, :, traced], lost = self._samples.at(x, y, every[:, traced])
         given_up = np.zeros(shape, dtype=bool)
         given_up[traced] = lost
         given_up &= inside
@@ -449,7 +324,7 @@ class DiskPainting:
             moved = here[:, seen[0], seen[1], seen[2]] + right * x + below * y
             moved[U] = u
             place = (columns[chosen][seen], rows[chosen][seen])
-            self._write(order, place, self._matter(moved), share[seen])
+            self._write(order, place, self._samples.matter(moved), share[seen])
             self._divide(order, columns[chosen][finer], rows[chosen][finer], here[:, finer])
 
     def _needs_finer(self, u: Array, across: Array, down: Array) -> Mask:
@@ -477,7 +352,7 @@ class DiskPainting:
             x, y = np.broadcast_arrays(x, y)
             alone = np.zeros((self._disk.crossings, x.size), dtype=bool)
             alone[order] = True
-            values, _ = self._sample(x.ravel(), y.ravel(), alone)
+            values, _ = self._samples.at(x.ravel(), y.ravel(), alone)
             here = values[order].reshape(-1, *x.shape)
             here[U] = np.clip(here[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
             down, across = np.gradient(here[U], axis=(1, 2))
@@ -486,7 +361,7 @@ class DiskPainting:
             seen = share > 0.0
             here = here.reshape(self._channels, len(column), -1)[:, seen]
             here[U] = np.clip(here[U], 1.0 / self._outer, 1.0 / self._inner)
-            radius, phi, g = self._matter(here)
+            radius, phi, g = self._samples.matter(here)
             # A pixel that is partly covered, or by all of the disk at once, shows its mean: one place of it would
             # twinkle from pixel to pixel along a thin ring.
             weights = shares[seen] / shares[seen].sum(axis=1, keepdims=True)
@@ -496,17 +371,10 @@ class DiskPainting:
             whole = share[seen] == 1.0
             centre = centres[:, start : start + group][:, seen][:, whole]
             centre[U] = np.clip(centre[U], 1.0 / self._outer, 1.0 / self._inner)
-            for each, central in zip(matter, self._matter(centre), strict=True):
+            for each, central in zip(matter, self._samples.matter(centre), strict=True):
                 each[whole] = central
             matter[1] = wrapped(matter[1])
             self._write(order, (column[seen], row[seen]), (matter[0], matter[1], matter[2]), share[seen])
-
-
-def nearest_turn(angle: Array) -> Array:
-    """Return angles brought to [-pi, pi] by whole turns."""
-    turn = 2.0 * math.pi
-    near: Array = angle - turn * np.round(angle * (1.0 / turn))
-    return near
 
 
 def _slopes(values: Array, place: tuple[NDArray[np.intp], ...]) -> tuple[Array, Array]:

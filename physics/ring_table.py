@@ -18,16 +18,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .crossings import cross_plane
 from .observer import Observer
 from .rays import Array, rays_from_triad
-from .sky_table import AROUND, AROUND_ERROR, lagrange_weights, position_angles
+from .sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
 from .sphere import cos_sin
 from .trapped import around_hole, edge_angles
 
+Mask = NDArray[np.bool_]
+
 # The step of asinh(delta / w), and the fewest and most position angles of the grid.
-STEP = 0.3
+STEP = 0.25
 ANGLES = (96, 512)
 # How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
 REACH = (0.7, 1.5)
@@ -86,9 +89,10 @@ class _Coordinates:
 class RingTable:
     """Where rays around the shadow's edge cross the plane for the k-th time, for one camera's place."""
 
-    def __init__(self, coordinates: _Coordinates, channels: list[Array]) -> None:
+    def __init__(self, coordinates: _Coordinates, channels: list[Array], good: Mask, needs: Needs) -> None:
         """`channels`: u, unwound azimuth and du / dlambda, shape (angles + 3, columns), at all but the outermost s and
-        at the angles from the one before the first to the second after the last."""
+        at the angles from the one before the first to the second after the last; `good`: where all of them are known,
+        elsewhere only that they are off the disk."""
         self._angles = len(coordinates.edge)
         around = np.arange(AROUND[0], self._angles + AROUND[-1]) % self._angles
         self._edge, self._scale = coordinates.edge[around], coordinates.scale[around]
@@ -96,15 +100,19 @@ class RingTable:
         self._first = 2.0 + coordinates.s[0] / (coordinates.s[1] - coordinates.s[0])
         self._columns = int(channels[0].shape[1])
         self._channels = [np.ascontiguousarray(each).ravel() for each in channels]
+        self._rims = 1.0 / needs.outer, 1.0 / needs.inner
+        reach = len(AROUND)
+        cells = np.lib.stride_tricks.sliding_window_view(good, (reach, reach))
+        self._good = np.ascontiguousarray(cells.all(axis=(2, 3))).ravel()
 
     @property
     def rays(self) -> int:
         """How many rays it was made of, but for those that told the scale."""
         return self._angles * (self._columns + 2)
 
-    def places(self, light: Array, channels: int) -> Array:
-        """Return the first few channels for light, shape (3, n) as for `SkyTable.directions`; NaN: no answer."""
-        away, row, part = position_angles(light, self._angles)
+    def places(self, away: Array, angle: Array, channels: int) -> Array:
+        """Return the first few channels at `position_angles`, shape (channels, n); NaN: no answer."""
+        row, part = angle_steps(angle, self._angles)
         across = lagrange_weights(part, AROUND)
         edge, scale, step = (
             sum(weight * each.take(row + i) for i, weight in enumerate(across))
@@ -122,7 +130,10 @@ class RingTable:
                 both, index = weight * other, first + j
                 for component, values in zip(result, self._channels[:channels], strict=True):
                     component += both * values.take(index)
-        result[:, ~inside] = np.nan
+        low, high = self._rims
+        unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
+        unknown &= (result[0] >= low) & (result[0] <= high)
+        result[:, unknown | ~inside] = np.nan
         return result
 
 
@@ -164,7 +175,7 @@ def ring_tables(spin: float, observer: Observer, rays: dict[int, float], needs: 
         s = s[s > -(inside / outside).min()]
         grid = _Coordinates(here, scale, np.arcsinh(REACH[1] * here / scale), s)
         values = cross(here[:, None] + grid.delta, aside, up, [order])[:, 0]
-        tables[order] = RingTable(grid, _served(values, grid, needs))
+        tables[order] = RingTable(grid, *_served(values, grid, needs), needs)
     return tables
 
 
@@ -187,8 +198,8 @@ def _between(scale: Array, angles: int) -> Array:
     return smooth
 
 
-def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
-    """Return the channels for `RingTable`, NaN around which interpolation is not good enough."""
+def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array], Mask]:
+    """Return the channels for `RingTable`, NaN where nothing is known well enough, and where all of them are."""
     u, azimuth, slope = values
     angles = len(u)
     azimuth = np.nan_to_num(azimuth)  # rays that never cross: their u is not known either
@@ -226,5 +237,5 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> list[Array]:
         if each is u:
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
-    good |= far
-    return [np.where(good, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)]
+    known = good | far
+    return [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)], good[1:-1, 1:-1]

@@ -104,7 +104,8 @@ class SkyTable:
         `light`, shape (3, n), is where it runs in the FIDO's frame, on (r-hat, theta-hat, phi-hat), at azimuth `phi`.
         NaN where the table has no answer: in the shadow, next to its edge, and where interpolation is not good enough.
         """
-        away, row, part = position_angles(light, ANGLES)
+        away, angle = position_angles(light)
+        row, part = angle_steps(angle, ANGLES)
         across = lagrange_weights(part, AROUND)
         edge = sum(weight * self._edge.take(row + i) for i, weight in enumerate(across))
         delta = away - edge
@@ -168,15 +169,21 @@ def _served(values: Array, edge: Array, delta: Array, error: float) -> NDArray[n
     return good
 
 
-def position_angles(light: Array, count: int) -> tuple[Array, NDArray[np.intp], Array]:
-    """Return how far from the hole's direction a FIDO sees light, radians, and its position angle there, in steps of
-    a circle divided by `count`: whole ones and the part left; for `light` see `SkyTable.directions`."""
+def position_angles(light: Array) -> tuple[Array, Array]:
+    """Return how far from the hole's direction a FIDO sees light, and its position angle there in [0, 2 pi], radians;
+    for `light` see `SkyTable.directions`."""
     outward, aside, up = light
     away: Array = np.arctan2(np.sqrt(aside * aside + up * up), outward)
-    angle = np.arctan2(-up, -aside) * (count / (2.0 * math.pi))
-    angle += (angle < 0.0) * float(count)
-    whole = np.minimum(angle.astype(np.intp), count - 1)
-    return away, whole, angle - whole
+    angle = np.arctan2(-up, -aside)
+    angle += (angle < 0.0) * (2.0 * math.pi)
+    return away, angle
+
+
+def angle_steps(angle: Array, count: int) -> tuple[NDArray[np.intp], Array]:
+    """Return angles in steps of a circle divided by `count`: whole ones and the part left."""
+    steps = angle * (count / (2.0 * math.pi))
+    whole = np.minimum(steps.astype(np.intp), count - 1)
+    return whole, steps - whole
 
 
 def lagrange_weights(part: Array, points: tuple[int, ...]) -> list[Array]:

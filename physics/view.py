@@ -90,9 +90,9 @@ class View:
 
         They go on smoothly beyond the rays' ends, see `crossings.Crossings`; for `wanted` see `disk_crossings`.
         """
-        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        looking = self._camera.directions(x * self._per_pixel, y * self._per_pixel) @ self._camera_to_motion
         return disk_crossings(
-            self._spin, self._observer, seen @ self._camera_to_motion, count, tolerance, method, beyond=True, wanted=wanted
+            self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted
         )
 
     def places_in_plane(self, radii: Array, azimuths: Array) -> tuple[Array, Array]:

@@ -10,12 +10,13 @@ from shots import shot
 
 from physics import Disk, Observer, bake
 from physics.crossings import cross_plane
-from physics.disk_painting import PIXEL_ERROR, PLACE_ERROR
+from physics.disk_samples import PIXEL_ERROR, PLACE_ERROR
 from physics.mino import radial_polynomial
 from physics.polar import PolarMotion
 from physics.radial_path import winding
 from physics.rays import rays_from_triad
 from physics.ring_table import Needs, ring_tables
+from physics.sky_table import position_angles
 from physics.sphere import unit_vectors
 from physics.view import View
 
@@ -60,7 +61,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
     tables = tables_of(parameters)
     assert set(tables) == {1, 2}
     for order, table in tables.items():
-        u, azimuth = table.places(view.light(x, y), 2)
+        u, azimuth = table.places(*position_angles(view.light(x, y)), 2)
         known = np.isfinite(u)
         exact = traced.u[order]
         on_disk = (exact > 1.0 / outer) & (exact < 1.0 / inner)
@@ -84,7 +85,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
 def test_tables_save_rays_and_leave_the_picture_as_it_is(monkeypatch):
     parameters = dataclasses.replace(shot(960, 540, spin=0.9, radius=20.0, fov=40.0), disk=Disk())
     with_tables = bake(parameters)
-    monkeypatch.setattr("physics.disk_painting.WORTHWHILE_RAYS", math.inf)
+    monkeypatch.setattr("physics.disk_samples.WORTHWHILE_RAYS", math.inf)
     without = bake(parameters)
     assert with_tables.counts["disk_rays"] < 0.8 * without.counts["disk_rays"]
     for one, other in zip(with_tables.disk_passes, without.disk_passes, strict=True):

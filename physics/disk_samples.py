@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a map knows of its disk at any place of the picture: by rays, and by tables next to the shadow."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .metric import isco_radius
+from .orbiting_matter import circular_redshift, redshift_factor
+from .painting import wrapped
+from .radial_path import winding
+from .rays import Array
+from .ring_table import Needs, RingTable, ring_tables
+from .shot import WarpMapParameters
+from .sky_table import position_angles
+from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
+from .view import View
+
+Mask = NDArray[np.bool_]
+
+# Error of place on the disk, relative, for each radian of error of direction that is allowed.
+PLACE_ERROR = 40.0
+# Rays need be better than that by this only.
+TRACING_SHARE = 0.1
+# Where the image is crowded, this share of the way from pixel to pixel will do.
+PIXEL_ERROR = 0.03
+
+# Rays from which on a table is worthwhile, and the share of them that it is made of.
+WORTHWHILE_RAYS = 12_000
+TABLE_SHARE = 0.35
+# Outside of this radius there are no rays of negative energy, at any latitude.
+ERGOSPHERE = 2.0
+
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far.
+LOWEST_U, HIGHEST_U = -30.0, 20.0
+
+# Channels of what is interpolated: 1 / r, the unwound azimuth, energy and angular momentum of the light for a camera
+# energy of 1, and where matter falls du / dlambda on the same scale.
+U, PHI, ENERGY, MOMENTUM, SLOPE = range(5)
+
+# A disk that reaches inside the ISCO by less than this share of its radius does not.
+AT_ISCO = 1e-9
+
+
+class DiskSamples:
+    """Samples of the crossings of one map's rays, and the redshift of matter there."""
+
+    def __init__(self, parameters: WarpMapParameters, view: View) -> None:
+        assert parameters.disk is not None
+        self._parameters, self._view, self._disk = parameters, view, parameters.disk
+        self._inner, self._outer = self._disk.radii(parameters.spin)
+        isco = isco_radius(parameters.spin, prograde=not self._disk.retrograde)
+        self._falls = self._inner < isco * (1.0 - AT_ISCO)
+        self._tolerance = max(parameters.tolerance, TRACING_SHARE * PLACE_ERROR * parameters.interpolation)
+        self._tables: dict[int, RingTable] = {}
+        self.channels = SLOPE + 1 if self._falls else SLOPE
+        """How many channels there are: U to MOMENTUM, and SLOPE where matter falls."""
+        self.rays = 0
+        """How many rays were traced so far."""
+
+    def at(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
+        """Return the channels, shape (crossings, channels, n), and which rays were given up, (n,).
+
+        Only what is `wanted`, shape (crossings, n), means anything; the others' u is NaN.
+
+        u is finite everywhere: rays that never cross count as far beyond their end.
+        """
+        if not self._tables:
+            return self._trace_rays(x, y, wanted)
+        values, lost = np.full((self._disk.crossings, self.channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
+        asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
+        rays = self._view.rays(x[asked], y[asked])
+        away, angle = position_angles(self._view.light(x[asked], y[asked]))
+        left = wanted.copy()
+        for order, table in self._tables.items():
+            here = np.flatnonzero(wanted[order, asked])
+            place = table.places(away[here], angle[here], 3 if self._falls else 2)
+            known = np.isfinite(place[0])
+            here, place = here[known], place[:, known]
+            left[order, asked[here]] = False
+            one_plus_z = rays.one_plus_z[here]
+            found = [self._clipped(place[0]), place[1], one_plus_z, rays.b[here] * one_plus_z]
+            if self._falls:
+                found.append(place[2] * one_plus_z)
+            values[order, :, asked[here]] = np.stack(found, axis=1)
+        traced = np.flatnonzero(left.any(axis=0))
+        part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
+        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
+        return values, lost
+
+    def _clipped(self, u: Array) -> Array:
+        clipped: Array = np.clip(u, LOWEST_U / self._outer, HIGHEST_U / self._inner)
+        return clipped
+
+    def _trace_rays(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
+        """Do what `at` does, a ray for each place."""
+        values = np.empty((self._disk.crossings, self.channels, len(x)))
+        lost = np.zeros(len(x), dtype=bool)
+        for start in range(0, len(x), BLOCK_SIZE):
+            block = slice(start, start + BLOCK_SIZE)
+            found, light = self._view.crossings(
+                x[block],
+                y[block],
+                self._disk.crossings,
+                self._tolerance,
+                self._parameters.method,
+                wanted[:, block],
+            )
+            low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
+            nowhere = np.where(found.fate == Fate.SHADOW, high, low)
+            u = self._clipped(np.where(np.isnan(found.u), nowhere, found.u))
+            values[:, U, block] = np.where(wanted[:, block], u, np.nan)
+            values[:, PHI, block] = np.nan_to_num(found.unwound)
+            values[:, ENERGY, block] = light.energy / light.camera_energy
+            values[:, MOMENTUM, block] = light.b / light.camera_energy
+            if self._falls:
+                values[:, SLOPE, block] = np.nan_to_num(found.u_slope / light.camera_energy)
+            lost[block] = found.fate == Fate.UNRESOLVED
+        self.rays += len(x)
+        return values, lost
+
+    def make_tables(self, rays: NDArray[np.intp]) -> None:
+        """Make tables of those later images that would ask for many rays; `rays`: how many, by crossing."""
+        orders = {k: TABLE_SHARE * rays[k] for k in range(1, self._disk.crossings) if rays[k] > WORTHWHILE_RAYS}
+        observer = self._parameters.observer()
+        stepping = self._parameters.method != DEFAULT_METHOD
+        if not orders or stepping or observer.r < ERGOSPHERE:
+            return
+        needs = Needs(
+            self._inner,
+            self._outer,
+            self._tolerance,
+            self._parameters.pixel_angle,
+            PIXEL_ERROR,
+            PLACE_ERROR * self._parameters.interpolation,
+        )
+        self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
+        self.rays += sum(table.rays for table in self._tables.values())
+
+    def matter(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
+        u, spin, retrograde = values[U], self._parameters.spin, self._disk.retrograde
+        phi = values[PHI] + winding(spin, u)
+        turn = phi.dtype.type(2.0 * math.pi)
+        phi -= turn * np.floor(phi * (1.0 / turn))
+        radius = 1.0 / u
+        if self._falls:
+            radial = values[SLOPE] / (u * u)
+            g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
+        else:
+            g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)
+        return radius, wrapped(phi), g
+
+
+def nearest_turn(angle: Array) -> Array:
+    """Return angles brought to [-pi, pi] by whole turns."""
+    turn = 2.0 * math.pi
+    near: Array = angle - turn * np.round(angle * (1.0 / turn))
+    return near
