@@ -46,7 +46,7 @@ def commands(code: str) -> list[list[str]]:
 def _split(words: list[str]) -> list[list[str]]:
     parts: list[list[str]] = [[]]
     for word in words:
-        if word in ("&&", ";", "|", "||"):
+        if word in ("&&", "&", ";", "|", "||"):
             parts.append([])
         else:
             parts[-1].append(word)
@@ -68,6 +68,8 @@ def check(words: list[str], blender: Blender) -> None:
     program = os.path.basename(words[0])
     if re.fullmatch(r"python(3(\.\d+)?)?", program):
         _check_python(words[1:])
+    elif program == "ssh":
+        check(words[2:], blender)  # after the machine's name
     elif program in CHECKS:
         CHECKS[program](words[1:], blender)
     else:
