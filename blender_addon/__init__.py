@@ -6,9 +6,17 @@ from collections.abc import Callable
 
 import bpy
 
-from . import disk_panel, handlers, operators, panels, properties
+from . import cache_panel, command, disk_panel, farm_copy, farm_templates, handlers, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *disk_panel.CLASSES)
+_CLASSES = (
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *disk_panel.CLASSES,
+    *cache_panel.CLASSES,
+    *farm_copy.CLASSES,
+    *farm_templates.CLASSES,
+)
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
 # fails loudly, so that it can be tried again.
@@ -23,7 +31,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, handlers):
+        for module in (properties, operators, handlers, command):
             module.register()
             _undo.append(module.unregister)
     except BaseException:

@@ -6,6 +6,9 @@ datablock since the last time. So it holds names, and looks the scene up each ti
 """
 
 import functools
+import re
+import time
+from collections import deque
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,15 +17,22 @@ from pathlib import Path
 import bpy
 
 from . import lens_sync, maps, shot, sync
-from ._physics import exit_map, exit_map_file, physics
+from ._physics import claim, exit_map, exit_map_file, physics
 from .compositor_tree import find_setup
 from .errors import SceneError
 
 # What the maps of one bake or render have in common is kept here.
 _baker = physics.MapBaker()
 
-# How long a step waits for a map that is being written, seconds.
-WAIT = 0.02
+# What comes of a frame: its map was baked here, or held already.
+BAKED, KEPT = "baked", "kept"
+
+# How long a step waits for a map that is being written, and how often a map is looked for that another process is
+# baking, seconds.
+WAIT, POLL = 0.02, 0.5
+
+# What a message that names its frame begins with.
+_NAMED = re.compile(r"Frame -?\d+: ")
 
 
 @dataclass(frozen=True)
@@ -33,6 +43,8 @@ class Progress:
     fraction: float
     """Share of all the work that is done, 0..1."""
     text: str
+    outcome: str | None = None
+    """`BAKED` or `KEPT` where the frame is done."""
 
 
 @dataclass
@@ -83,10 +95,15 @@ def _steps(
     path: Path, parameters: "physics.WarpMapParameters"
 ) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
     """Bake a map of the kind that its path says, once it is sure that it can be written."""
-    maps.prepare(path, parameters.map_size, 1 + len(maps.pass_paths(path, parameters)))
+    prepare(path, parameters)
     if maps.kind_of(path) is maps.EXIT_MAP:
         return (yield from exit_map.bake_exit_map_steps(parameters))
     return (yield from _baker.steps(parameters))
+
+
+def prepare(path: Path, parameters: "physics.WarpMapParameters") -> None:
+    """Make sure, before any work is done, that a map can be written with its passes; see `maps.prepare`."""
+    maps.prepare(path, parameters.map_size, 1 + len(maps.pass_paths(path, parameters)))
 
 
 def _save(path: Path, baked: "physics.WarpMap | exit_map.ExitMap") -> None:
@@ -127,10 +144,19 @@ def provide_map(
         return
     if not scene.umbra.auto_bake:
         raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
-    where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
-    print(f"Umbra: baking the {maps.kind_of(path).noun} of frame {frame}{where}", flush=True)
-    for _fraction in bake_map(path, parameters):
-        pass
+    prepare(path, parameters)
+    noun = maps.kind_of(path).noun
+    with claim.Claims() as claims:
+        if not take(claims, path, parameters):
+            print(f"Umbra: waiting for the {noun} of frame {frame}, which {claims.holder(path)} bakes", flush=True)
+            while not take(claims, path, parameters):
+                time.sleep(POLL)
+        if maps.is_fresh(path, parameters):
+            return
+        where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
+        print(f"Umbra: baking the {noun} of frame {frame}{where}", flush=True)
+        for _fraction in bake_map(path, parameters):
+            claims.beat()
 
 
 def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.WarpMapParameters":
@@ -144,6 +170,15 @@ def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     if lens_sync.is_on(scene):
         return maps.exit_map_path(scene, frame_shot.hole_name, parameters_of(scene, frame_shot), frame_shot.frame)
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
+
+
+def map_at(
+    scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None
+) -> "tuple[Path, physics.WarpMapParameters]":
+    """Where the map of any frame lies, or will lie, and what it is made from; see `shot.read_at`."""
+    layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+    frame_shot = shot.read_at(scene, frame, layer)
+    return path_of(scene, frame_shot), parameters_of(scene, frame_shot)
 
 
 def bake_frames(
@@ -161,7 +196,7 @@ def bake_frames(
     frames : iterable of int
         Frames in the order of baking.
     view_layer_name : str, optional
-        The view layer whose objects count; the scene's first by default.
+        The view layer whose objects count; the first that is rendered by default.
 
     Raises
     ------
@@ -169,56 +204,151 @@ def bake_frames(
         As one sentence, which names the frame where there are several.
     """
     wanted = list(frames)
-    summary = Summary()
-    with physics.Background() as writing:
-        for index, frame in enumerate(wanted):
-            scene = bpy.data.scenes.get(scene_name)
-            if scene is None:
-                raise SceneError(f'Scene "{scene_name}" is gone: baking has stopped.')
-            text = f"Frame {frame}" + (f" ({index + 1} of {len(wanted)})" if len(wanted) > 1 else "")
-            with _naming(frame, len(wanted)):
-                layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
-                frame_shot = shot.read_at(scene, frame, layer)
-                parameters = parameters_of(scene, frame_shot)
-                path = path_of(scene, frame_shot)
-                summary.folder = maps.folder(scene)
-                yield Progress(frame, index / len(wanted), text)
-                if maps.is_fresh(path, parameters):
-                    summary.reused.append(frame)
-                    continue
-                steps = _steps(path, parameters)
-                while True:
-                    try:
-                        fraction = next(steps)
-                    except StopIteration as end:
-                        baked = end.value
-                        break
-                    yield Progress(frame, (index + fraction) / len(wanted), text)
-            summary.unresolved += baked.counts.get("unresolved", 0)
-            while not writing.wait(WAIT):
-                yield Progress(frame, (index + 1) / len(wanted), text)
-            writing.start(functools.partial(_write, path, baked, frame, len(wanted)))
-            summary.baked.append(frame)
-        while not writing.wait(WAIT):
-            yield Progress(wanted[-1], 1.0, "Writing")
+    with claim.Claims() as claims, physics.Background() as writing:
+        work = _Work(scene_name, view_layer_name, wanted, claims, writing)
+        todo, elsewhere = deque(wanted), deque[int]()
+        while todo or elsewhere:
+            if not todo:
+                yield from work.finish_writing()
+                yield from work.wait_for(elsewhere[0])
+                todo, elsewhere = elsewhere, deque[int]()
+            frame = todo.popleft()
+            with naming(frame, len(wanted)):
+                done = yield from work.bake(frame)
+            if not done:
+                elsewhere.append(frame)
+        yield from work.finish_writing()
     finish(scene_name)
-    return summary
+    return work.summary
+
+
+class _Work:
+    """A bake of several frames: while one map is traced, the one before is written."""
+
+    def __init__(
+        self,
+        scene_name: str,
+        view_layer_name: str | None,
+        wanted: list[int],
+        claims: claim.Claims,
+        writing: physics.Background,
+    ) -> None:
+        self.summary = Summary()
+        self._scene_name, self._view_layer_name = scene_name, view_layer_name
+        self._places = {frame: index + 1 for index, frame in enumerate(wanted)}
+        self._count = len(wanted)
+        self._fraction = 0.0
+        self._claims, self._writing = claims, writing
+        self._half_files: dict[str, list[Path]] | None = None
+        self._being_written: tuple[int, Path] | None = None
+        self._refused: Path | None = None
+        """The last map that another process had claimed."""
+
+    def bake(self, frame: int) -> Generator[Progress, None, bool]:
+        """Bake a frame unless its map holds; return False where another process is doing it."""
+        scene = bpy.data.scenes.get(self._scene_name)
+        if scene is None:
+            raise SceneError(f'Scene "{self._scene_name}" is gone: baking has stopped.')
+        path, parameters = map_at(scene, frame, self._view_layer_name)
+        self.summary.folder = maps.folder(scene)
+        yield self._progress(frame)
+        if not maps.is_fresh(path, parameters):
+            prepare(path, parameters)
+            if self._half_files is None:
+                self._half_files = maps.half_files(path.parent)
+            if not take(self._claims, path, parameters, self._half_files):
+                self._refused = path
+                return False
+            if not maps.is_fresh(path, parameters):  # nobody else has made it in the meantime
+                baked = yield from self._trace(frame, path, parameters)
+                yield from self.finish_writing()
+                self._writing.start(functools.partial(_write, path, baked, frame, self._count))
+                self._being_written = frame, path
+                self.summary.baked.append(frame)
+                return True
+            self._claims.release(path)
+        self.summary.reused.append(frame)
+        yield self._progress(frame, outcome=KEPT)
+        return True
+
+    def _trace(
+        self, frame: int, path: Path, parameters: "physics.WarpMapParameters"
+    ) -> Generator[Progress, None, "physics.WarpMap | exit_map.ExitMap"]:
+        steps = _steps(path, parameters)
+        while True:
+            try:
+                fraction = next(steps)
+            except StopIteration as end:
+                self.summary.unresolved += end.value.counts.get("unresolved", 0)
+                return end.value
+            self._claims.beat()
+            yield self._progress(frame, fraction)
+
+    def finish_writing(self) -> Generator[Progress, None, None]:
+        """Wait for the map that is being written, and give its claim back."""
+        if self._being_written is None:
+            return
+        frame, path = self._being_written
+        while not self._writing.wait(WAIT):
+            self._claims.beat()
+            yield self._progress(frame, doing=": writing")
+        self._being_written = None
+        self._claims.release(path)
+        yield self._progress(frame, outcome=BAKED)
+
+    def wait_for(self, frame: int) -> Generator[Progress, None, None]:
+        """Let some time pass: only frames are left that other processes are baking."""
+        who = self._claims.holder(self._refused)
+        for _ in range(round(POLL / WAIT)):
+            time.sleep(WAIT)
+            yield self._progress(frame, doing=f": waiting for {who}")
+
+    def _progress(self, frame: int, fraction: float = 0.0, outcome: str | None = None, doing: str = "") -> Progress:
+        done = len(self.summary.baked) + len(self.summary.reused)
+        self._fraction = max(self._fraction, min((done + fraction) / self._count, 1.0))
+        place = f" ({self._places[frame]} of {self._count})" if self._count > 1 else ""
+        return Progress(frame, self._fraction, f"Frame {frame}{place}{doing}", outcome)
+
+
+def take(
+    claims: claim.Claims,
+    path: Path,
+    parameters: "physics.WarpMapParameters",
+    half_files: dict[str, list[Path]] | None = None,
+) -> bool:
+    """Claim a frame's map, and remove what a process that was killed has left of it; False if another one has it.
+
+    Raises
+    ------
+    MapFolderError
+        The folder cannot be written to.
+    """
+    if half_files is None:
+        half_files = maps.half_files(path.parent)
+    try:
+        if not claims.take(path):
+            return False
+        for one in (path, *maps.pass_paths(path, parameters)):
+            for half in half_files.pop(one.name, ()):
+                half.unlink(missing_ok=True)
+    except OSError as error:
+        raise maps.explain(error, path.parent) from error
+    return True
 
 
 @contextmanager
-def _naming(frame: int, count: int) -> Iterator[None]:
+def naming(frame: int, count: int) -> Iterator[None]:
     """Name the frame in what goes wrong, where there are several."""
     try:
         yield
     except physics.BlackHoleError as error:
-        prefix = f"Frame {frame}: "
-        if count == 1 or str(error).startswith(prefix):
+        if count == 1 or _NAMED.match(str(error)):
             raise
-        raise SceneError(prefix + str(error)) from error
+        raise SceneError(f"Frame {frame}: {error}") from error
 
 
 def _write(path: Path, baked: "physics.WarpMap | exit_map.ExitMap", frame: int, count: int) -> None:
-    with _naming(frame, count):
+    with naming(frame, count):
         _save(path, baked)
 
 
@@ -231,8 +361,10 @@ def finish(scene_name: str) -> None:
         sync.forget_loaded_map(scene)
 
 
-def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) -> Summary:
-    """Run a bake to its end; with `announce`, each tenth of the work is printed."""
+def drain(
+    steps: Generator[Progress, None, Summary], *, announce: bool = False, doing: str = "Baking warp maps"
+) -> Summary:
+    """Run a bake, or the like, to its end; with `announce`, each tenth of the work is printed."""
     told = -1
     while True:
         try:
@@ -242,4 +374,4 @@ def drain(steps: Generator[Progress, None, Summary], *, announce: bool = False) 
         tenth = int(progress.fraction * 10)
         if announce and tenth != told:
             told = tenth
-            print(f"Umbra: baking warp maps {progress.fraction:4.0%}  {progress.text}", flush=True)
+            print(f"Umbra: {doing[0].lower()}{doing[1:]} {progress.fraction:4.0%}  {progress.text}", flush=True)

@@ -12,13 +12,12 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
-from ._physics import exit_map_file, physics
+from ._physics import disk_pass_file, exit_map_file, exr, map_check, map_file, physics, warp_map_file
 from .errors import MapFolderError, SceneError
 
 SEQUENCE_LENGTH = 1_000_000
@@ -36,12 +35,14 @@ class MapKind:
     """What a file is read as: the map of the compositor, or that of the camera that bends its rays."""
 
     noun: str
-    read: Callable[[Path], object]
-    read_metadata: Callable[[Path], dict]
+    format: map_file.MapFormat
 
 
-WARP_MAP = MapKind("warp map", physics.read_warp_map, physics.read_warp_map_metadata)
-EXIT_MAP = MapKind("exit map", exit_map_file.read_exit_map, exit_map_file.read_exit_map_metadata)
+WARP_MAP = MapKind("warp map", warp_map_file.FORMAT)
+EXIT_MAP = MapKind("exit map", exit_map_file.FORMAT)
+
+# The ending of copies that are being made while a file is saved for the first time.
+_PART = ".part"
 
 # What stands between an exit map's frame and the beginning of its hash.
 _EXIT_MARK = "_exit_"
@@ -63,7 +64,8 @@ def folder(scene: bpy.types.Scene) -> MapFolder:
     if chosen.startswith("//") and not bpy.data.filepath:
         path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
         return MapFolder(str(path) + os.sep, path, True)
-    return MapFolder(chosen, Path(bpy.path.abspath(chosen)), False)
+    # what a linked scene calls beside the file is beside its own file
+    return MapFolder(chosen, Path(bpy.path.abspath(chosen, library=scene.library)), False)
 
 
 def _chosen_folder(scene: bpy.types.Scene) -> str:
@@ -76,8 +78,12 @@ def _chosen_folder(scene: bpy.types.Scene) -> str:
 
 def stem(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int]) -> str:
     """A map's file name up to the frame's number; `size` is the map's own, supersampling included."""
-    names = "_".join(bpy.path.clean_name(name) for name in (scene.name, hole_name))
-    return f"{names}_{size[0]}x{size[1]}_"
+    return f"{names_of(scene, hole_name)}_{size[0]}x{size[1]}_"
+
+
+def names_of(scene: bpy.types.Scene, hole_name: str) -> str:
+    """What all maps of a scene's hole begin with."""
+    return "_".join(bpy.path.clean_name(name) for name in (scene.name, hole_name))
 
 
 def file_name(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
@@ -149,27 +155,24 @@ def is_fresh(path: Path, parameters: "physics.WarpMapParameters", *, thorough: b
 
 
 def fault_of(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> str | None:
-    """What is wrong with a map or a disk's pass as the beginning of a sentence, or None if all hold.
+    """What is wrong with a map or a disk's pass as the beginning of a sentence, or None if all hold; see `check`."""
+    return check(path, parameters, thorough=thorough).fault or None
+
+
+def check(path: Path, parameters: "physics.WarpMapParameters", *, thorough: bool = True) -> map_check.Finding:
+    """What a map is, its disk's passes counted in: the first thing that is the matter with any of them.
 
     Thorough: its pixels are read and checked too (some 0.1 s in full HD); otherwise the header is taken at its word.
     """
     kind = kind_of(path)
-    if not path.is_file():
-        state = "out of date" if kind is EXIT_MAP and older_exit_maps(path) else "missing"
-        return f"The {kind.noun} {path} is {state}"
-    try:
-        if kind.read_metadata(path)["hash"] != parameters.hash:
-            return f"The {kind.noun} {path} is out of date"
-        if thorough:
-            kind.read(path)
-        for one in pass_paths(path, parameters):
-            if not one.is_file():
-                return f"The disk's pass {one} is missing"
-            if thorough and physics.read_disk_pass(one).metadata["hash"] != parameters.hash:
-                return f"The disk's pass {one} is out of date"
-    except physics.WarpMapError as error:
-        return str(error).removesuffix("; bake it again.")
-    return None
+    found = map_check.check_map(path, kind.format, parameters.hash, thorough=thorough)
+    if found.state is map_check.State.MISSING and kind is EXIT_MAP and older_exit_maps(path):
+        return map_check.Finding(map_check.State.STALE, f"The {kind.noun} {path} is out of date")
+    for one in pass_paths(path, parameters):
+        if found.state is not map_check.State.VALID:
+            break
+        found = map_check.check_map(one, disk_pass_file.FORMAT, parameters.hash, thorough=thorough)
+    return found
 
 
 def count_baked(
@@ -211,6 +214,22 @@ def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:
         )
 
 
+def half_files(directory: Path) -> dict[str, list[Path]]:
+    """Files that are being written, or were when their process was killed, by the name that they were to have."""
+    found: dict[str, list[Path]] = {}
+    try:
+        names = sorted(os.listdir(directory))
+    except OSError:
+        return found
+    for name in names:
+        target = exr.target_of(name)
+        if target is None and name.startswith(".") and name.endswith(_PART):
+            target = name.removeprefix(".").removesuffix(_PART)
+        if target is not None:
+            found.setdefault(target, []).append(directory / name)
+    return found
+
+
 def explain(error: OSError, place: Path) -> MapFolderError:
     """The sentence for a failure of the file system."""
     if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
@@ -221,6 +240,15 @@ def explain(error: OSError, place: Path) -> MapFolderError:
     return MapFolderError(
         f"The warp map folder {place} cannot be written to ({reason}): choose another folder in the Umbra "
         "panel, or change its permissions."
+    )
+
+
+def explain_reading(error: OSError, place: Path) -> MapFolderError:
+    """The sentence for a folder that cannot be listed."""
+    reason = error.strerror or str(error)
+    return MapFolderError(
+        f"The warp map folder {place} cannot be read ({reason}): choose another folder in the Umbra panel, or change "
+        "its permissions."
     )
 
 
@@ -256,7 +284,7 @@ def adopt(scene: bpy.types.Scene, blend_file: Path) -> str | None:
             destination = target / path.name
             if not destination.exists():
                 target.mkdir(parents=True, exist_ok=True)
-                partial = destination.with_name(f".{destination.name}.part")
+                partial = destination.with_name(f".{destination.name}{_PART}")
                 shutil.copyfile(path, partial)
                 os.replace(partial, destination)
     except OSError as error:

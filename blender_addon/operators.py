@@ -233,7 +233,10 @@ class UMBRA_OT_remove_foreground(bpy.types.Operator):
 
 
 class BakeOperator:
-    """Run a bake: at once in background and from scripts, beside the interface when invoked in a window."""
+    """Run a bake, or other work on maps: at once in background and from scripts, in a window beside the interface."""
+
+    doing = "Baking warp maps"
+    stopped = "Baking was stopped; the maps that are finished stay."
 
     _steps: Generator | None = None
     _timer: bpy.types.Timer | None = None
@@ -256,11 +259,16 @@ class BakeOperator:
             raise SceneError("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         if len(shot.holes(scene)) > 1 and scene.umbra.active_hole is not None:
             self.report({"WARNING"}, _only_one_is_rendered(scene))
+        return self.work(context)
+
+    def work(self, context: bpy.types.Context) -> Generator:
+        """The steps of the work; what the generator returns is reported."""
+        scene = context.scene
         return baking.bake_frames(scene.name, self.frames(scene), context.view_layer.name)
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        summary = baking.drain(self._start(context), announce=bpy.app.background)
+        summary = baking.drain(self._start(context), announce=bpy.app.background, doing=self.doing)
         self._report(summary)
         return {"FINISHED"}
 
@@ -283,7 +291,7 @@ class BakeOperator:
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if (event.type == "ESC" and event.value == "PRESS") or _stop_asked:
-            self.report({"INFO"}, "Baking was stopped; the maps that are finished stay.")
+            self.report({"INFO"}, self.stopped)
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -309,7 +317,7 @@ class BakeOperator:
         running = progress
         context.window_manager.progress_update(progress.fraction)
         context.workspace.status_text_set(
-            f"Baking warp maps: {progress.text}, {progress.fraction:.0%} done.  Esc stops."
+            f"{self.doing}: {progress.text}, {progress.fraction:.0%} done.  Esc stops."
         )
         _redraw(context)
 

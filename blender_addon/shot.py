@@ -387,14 +387,14 @@ def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer 
     frame : int
         The frame to read.
     view_layer : ViewLayer, optional
-        The layer whose objects count; the scene's first by default.
+        The layer whose objects count; the first that is rendered by default.
 
     Raises
     ------
     physics.BlackHoleError
         See `read`.
     """
-    layer = view_layer or scene.view_layers[0]
+    layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
     with _frame_kept(scene):
         scene.frame_set(frame)
         return read(scene, layer.depsgraph)

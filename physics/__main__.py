@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: ``python -m physics bake`` and ``python -m physics render``."""
+"""The command line: ``python -m physics bake``, ``render`` and ``verify``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import disk_command
+from . import disk_command, verify_command
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
 from .exr import read_exr, write_exr
@@ -99,6 +99,10 @@ def _parser() -> argparse.ArgumentParser:
     rendering.add_argument("--redshift-brightness", type=float, default=1.0, help="0 off, 1 physical")
     rendering.add_argument("--temperature", type=float, default=6500.0, help="of the sky's light, kelvin")
     disk_command.add_render_options(rendering)
+
+    verifying = commands.add_parser("verify", help="read maps and disk passes whole, and say which hold")
+    verifying.set_defaults(run=verify_command.verify)
+    verify_command.add_options(verifying)
     return parser
 
 

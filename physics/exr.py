@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,9 @@ from .errors import ImageFileError
 PathLike = str | os.PathLike[str]
 
 EXR_MAGIC = b"\x76\x2f\x31\x01"
+
+# Names of files that are being written, or that a process was writing when it was killed.
+_TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.tmp(\.[^.]+)")
 
 # Header attributes that describe how a file is stored rather than what it is about.
 STRUCTURAL_ATTRIBUTES = frozenset(
@@ -85,6 +89,12 @@ def replacing(path: PathLike) -> Iterator[Path]:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def target_of(name: str) -> str | None:
+    """Return the name of the file that a temporary one of `replacing` was to become; None for any other name."""
+    match = _TEMPORARY.fullmatch(name)
+    return None if match is None else match[1] + match[2]
 
 
 def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str] | None = None) -> None:

@@ -135,23 +135,35 @@ def links_of(tree: bpy.types.NodeTree) -> set[tuple[str, str, str, str]]:
     }
 
 
-def run_python(code: str, *, resources: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run_python(
+    code: str, *, resources: Path | None = None, timeout: float = PROCESS_TIMEOUT
+) -> subprocess.CompletedProcess[str]:
     """Run a script in a process of its own, with the extension that these tests installed.
 
     With a folder for `resources`, Blender keeps to that one instead, in which nothing is installed.
     """
-    enable = "bpy.ops.preferences.addon_enable(module='bl_ext.user_default.umbra_black_hole')\n"
     environment = dict(os.environ)
     if resources is not None:
         resources.mkdir(exist_ok=True)
         environment["BLENDER_USER_RESOURCES"] = str(resources)
-        enable = ""
-    tools = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
     return subprocess.run(
-        [sys.executable, "-c", f"import bpy\n{enable}{tools}{code}"],
+        _script(code, enable=resources is None),
         capture_output=True,
         text=True,
-        timeout=PROCESS_TIMEOUT,
+        timeout=timeout,
         check=False,
         env=environment,
     )
+
+
+def start_python(code: str) -> subprocess.Popen[str]:
+    """Start a script as `run_python` does, without waiting for it."""
+    return subprocess.Popen(_script(code), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def _script(code: str, *, enable: bool = True) -> list[str]:
+    """The command that runs a script with the tools of these tests, and with the extension unless told otherwise."""
+    begin = f"import bpy\nimport sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+    if enable:
+        begin += "bpy.ops.preferences.addon_enable(module='bl_ext.user_default.umbra_black_hole')\n"
+    return [sys.executable, "-c", begin + code]
