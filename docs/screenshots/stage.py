@@ -109,7 +109,11 @@ def show_panels(*names: str) -> None:
     for each in PANELS:
         options = set(getattr(each, "bl_options", set()))
         if CLOSED in options:  # a new name, because Blender remembers the old one as closed
+            before = getattr(each, "bl_idname", each.__name__)
             each.bl_idname, each.bl_options = f"{each.__name__}_open", options - {CLOSED}
+            for child in PANELS:
+                if getattr(child, "bl_parent_id", "") == before:
+                    child.bl_parent_id = each.bl_idname
         if each.__name__ == "VIEW3D_PT_umbra" or each.__name__.removeprefix("VIEW3D_PT_umbra_") in names:
             bpy.utils.register_class(each)
     area().spaces[0].show_region_ui = True
