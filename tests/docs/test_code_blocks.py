@@ -47,6 +47,7 @@ class SmallBlender:
 def blender(request, tmp_path, monkeypatch):
     """Blender, started where it is needed, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PWD", str(tmp_path))  # where Blender looks for the folder that it is in
     return SmallBlender(request)
 
 
