@@ -6,7 +6,18 @@ from collections.abc import Callable
 
 import bpy
 
-from . import cache_panel, command, disk_panel, farm_copy, farm_templates, handlers, operators, panels, properties
+from . import (
+    accuracy_check,
+    cache_panel,
+    command,
+    disk_panel,
+    farm_copy,
+    farm_templates,
+    handlers,
+    operators,
+    panels,
+    properties,
+)
 
 _CLASSES = (
     *properties.CLASSES,
@@ -16,6 +27,7 @@ _CLASSES = (
     *cache_panel.CLASSES,
     *farm_copy.CLASSES,
     *farm_templates.CLASSES,
+    *accuracy_check.CLASSES,
 )
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then

@@ -11,6 +11,7 @@ import importlib.util
 if importlib.util.find_spec(f"{__package__}.physics") is not None:
     from . import physics
     from .physics import (
+        accuracy,
         claim,
         colour,
         disk_flux,
@@ -34,6 +35,7 @@ if importlib.util.find_spec(f"{__package__}.physics") is not None:
 else:
     import physics  # type: ignore[no-redef]
     from physics import (  # type: ignore[no-redef]
+        accuracy,
         claim,
         colour,
         disk_flux,
@@ -56,6 +58,7 @@ else:
     )
 
 __all__ = [
+    "accuracy",
     "claim",
     "colour",
     "disk_flux",

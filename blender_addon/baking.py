@@ -13,6 +13,7 @@ from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
 
@@ -33,6 +34,8 @@ WAIT, POLL = 0.02, 0.5
 
 # What a message that names its frame begins with.
 _NAMED = re.compile(r"Frame -?\d+: ")
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -362,8 +365,8 @@ def finish(scene_name: str) -> None:
 
 
 def drain(
-    steps: Generator[Progress, None, Summary], *, announce: bool = False, doing: str = "Baking warp maps"
-) -> Summary:
+    steps: Generator[Progress, None, Result], *, announce: bool = False, doing: str = "Baking warp maps"
+) -> Result:
     """Run a bake, or the like, to its end; with `announce`, each tenth of the work is printed."""
     told = -1
     while True:

@@ -5,6 +5,8 @@ The artist's own nodes stay as they are: whatever the render layer's picture fed
 What must be known to undo that lies in custom properties, so that it is saved with the file.
 """
 
+import contextlib
+
 import bpy
 
 from . import disk_sync, node_group
@@ -16,6 +18,7 @@ from .compositor_tree import (
     ROLE,
     SKY,
     find_node,
+    find_nodes,
     find_setup,
     find_tree,
     has_scene_tree,
@@ -239,7 +242,8 @@ def remove(scene: bpy.types.Scene) -> None:
     ours = [node for node in tree.nodes if node.get(ROLE)] if tree is not None else []
     if not ours and BEFORE not in scene:
         raise SceneError(f'The compositor of scene "{scene.name}" contains no black hole: there is nothing to remove.')
-    before = dict(scene[BEFORE]) if BEFORE in scene else {}
+    kept = scene.get(BEFORE)
+    before = kept.to_dict() if hasattr(kept, "to_dict") else {}
     if tree is not None:
         tree_is_new = bool(before.get("tree_is_new"))
         _unlink(scene, tree, tree_is_new=tree_is_new)
@@ -253,10 +257,17 @@ def remove(scene: bpy.types.Scene) -> None:
         scene.use_nodes = bool(before["use_nodes"])
     for name in (*_RENDER_SETTINGS, "compositor_device"):
         if name in before:
-            value = before[name]
-            setattr(scene.render, name, value if isinstance(value, str) else bool(value))
+            _restore(scene.render, name, before[name])
     if BEFORE in scene:
         del scene[BEFORE]
+
+
+def _restore(render: bpy.types.RenderSettings, name: str, value: object) -> None:
+    """Set a setting back, unless what was kept of it has been overwritten with something else since."""
+    is_text = isinstance(getattr(render, name), str)
+    with contextlib.suppress(TypeError):  # text that is none of the setting's choices
+        if isinstance(value, str) == is_text:
+            setattr(render, name, value if is_text else bool(value))
 
 
 def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bool) -> None:
@@ -264,8 +275,7 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     setup = find_setup(scene)
     if setup is not None:
         disk_sync.remove(setup)
-    group = find_node(tree, GROUP)
-    if group is not None:
+    for group in find_nodes(tree, GROUP):
         _give_back(tree, group)
         prefix = group.path_from_id() + "."
         if tree.animation_data is not None:
@@ -273,15 +283,14 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
                 tree.animation_data.drivers.remove(curve)
         inner = group.node_tree
         tree.nodes.remove(group)
-        if inner is not None and inner.users == 0:
+        if inner is not None and inner.users == 0 and node_group.is_group(inner):
             bpy.data.node_groups.remove(inner)
-    for role in (MAP, SKY):
-        node = find_node(tree, role)
-        if node is None:
-            continue
-        image = node.image
+    maps, skies = find_nodes(tree, MAP), find_nodes(tree, SKY)
+    images = {node.image for node in maps if node.image is not None}
+    for node in maps + skies:
         tree.nodes.remove(node)
-        if role == MAP and image is not None and image.users == 0:
+    for image in images:
+        if image.users == 0:
             bpy.data.images.remove(image)
     layer = find_node(tree, RENDER_LAYER)
     if layer is not None and not tree_is_new and not any(each.is_linked for each in layer.outputs):
@@ -290,11 +299,12 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
 
 def _give_back(tree: bpy.types.NodeTree, group: bpy.types.Node) -> None:
     """Link what the group feeds to the render layer, except what was not linked at all before."""
-    if not group.inputs["Render"].is_linked:
+    into, out = group.inputs.get("Render"), group.outputs.get("Image")
+    if into is None or out is None or not into.is_linked:
         return
-    picture = group.inputs["Render"].links[0].from_socket
+    picture = into.links[0].from_socket
     output = output_node(tree)
-    for link in list(group.outputs["Image"].links):
+    for link in list(out.links):
         if group.get(OUTPUT_LINK) and output is not None and link.to_socket == output.inputs[0]:
             continue
         tree.links.new(picture, link.to_socket)

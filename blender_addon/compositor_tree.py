@@ -10,6 +10,8 @@ from .errors import SceneError
 # The node's custom property that says what it is for, and its values.
 ROLE = "umbra_role"
 GROUP, MAP, SKY, RENDER_LAYER, OUTPUT = "group", "map", "sky", "render_layer", "output"
+# What a node of a role is: one of another type was given the role by hand.
+TYPES = {GROUP: "GROUP", MAP: "IMAGE", SKY: "IMAGE", RENDER_LAYER: "R_LAYERS"}
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,12 @@ def find_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
 
 def find_node(tree: bpy.types.NodeTree, role: str) -> bpy.types.Node | None:
     """The add-on's node of that role in a tree."""
-    return next((node for node in tree.nodes if node.get(ROLE) == role), None)
+    return next(iter(find_nodes(tree, role)), None)
+
+
+def find_nodes(tree: bpy.types.NodeTree, role: str) -> list[bpy.types.Node]:
+    """All nodes that play a role in a tree: one, unless somebody made copies."""
+    return [node for node in tree.nodes if node.get(ROLE) == role and TYPES.get(role, node.type) == node.type]
 
 
 def find_setup(scene: bpy.types.Scene) -> Setup | None:
@@ -76,6 +83,26 @@ def check_rendered(scene: bpy.types.Scene) -> None:
     if not any(scene.view_layers[name].use for name in layers if name in scene.view_layers):
         raise SceneError(
             f'View layer "{layers[0]}" is not rendered: switch on Use for Rendering in its View Layer Properties.'
+        )
+
+
+def check_linked(scene: bpy.types.Scene) -> None:
+    """Refuse a set-up in which the group does not get the maps: its picture would be magenta without a word.
+
+    Raises
+    ------
+    SceneError
+        The warp map's node is gone, or not connected to the group.
+    """
+    setup = find_setup(scene)
+    if setup is None:
+        return
+    socket = setup.group.inputs.get("Warp Map")
+    origins = [link.from_node for link in socket.links] if socket is not None else []
+    if setup.map is None or setup.map not in origins:
+        raise SceneError(
+            f'The compositor of scene "{scene.name}" does not give the warp maps to the node "{setup.group.name}": run '
+            "Set Up Compositor."
         )
 
 

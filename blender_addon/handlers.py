@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 
 from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, shot, sync
 from ._physics import physics
-from .compositor_tree import check_rendered, find_setup, is_in_use
+from .compositor_tree import check_linked, check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
 
 # Names of scenes whose current frame is being rendered and has no valid map yet.
@@ -83,8 +83,16 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
+    _guarded(_repair, scene)
     _guarded(sync.sync_sky, scene)
     _guarded(disk_sync.refresh, scene)
+
+
+def _repair(scene: bpy.types.Scene) -> None:
+    """Make what was changed by hand inside the set-up whole; what cannot be is refused."""
+    if sync.repair(scene):
+        messages.warn(f'the node group "{node_group.GROUP_NAME}" was damaged or of another version, and is built anew.')
+    check_linked(scene)
 
 
 @persistent
@@ -155,6 +163,7 @@ def _take_map_away(scene: bpy.types.Scene) -> None:
         return
     sync.point_at_nothing(scene)
     check_rendered(scene)
+    check_linked(scene)
 
 
 def _restore_device(scene: bpy.types.Scene) -> None:
@@ -223,7 +232,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
             lens_sync.show_live(scene)
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
-            setup.group.node_tree = node_group.ensure_group()
+            sync.repair(scene)
             sync.refresh(scene)
 
 

@@ -237,7 +237,6 @@ class BakeOperator:
 
     doing = "Baking warp maps"
     stopped = "Baking was stopped; the maps that are finished stay."
-
     _steps: Generator | None = None
     _timer: bpy.types.Timer | None = None
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import disk_sync, environment, maps, shot
+from . import disk_sync, environment, maps, node_group, shot
 from .compositor_tree import Setup, find_setup
 from .errors import SceneError
 
@@ -14,11 +14,30 @@ NO_MAP = "no_warp_map_0001.exr"
 ROTATION_SOCKET, STRENGTH_SOCKET = "Environment Rotation", "Environment Strength"
 
 
+def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
+    """Make the node group of an existing set-up whole and of this version; whether there was something to do.
+
+    Thorough: the group's inside is looked through as well, which takes up to a tenth of a second; else its sockets.
+    """
+    setup = find_setup(scene)
+    if setup is None or setup.tree.library is not None:
+        return False
+    tree = setup.group.node_tree
+    inputs, outputs = setup.group.inputs, setup.group.outputs
+    whole = node_group.is_group(tree) and all(spec.name in inputs for spec in node_group.INPUTS)
+    whole = whole and all(spec.name in outputs for spec in node_group.OUTPUTS)
+    if whole and not (thorough and not node_group.is_current(tree)):
+        return False
+    setup.group.node_tree = node_group.ensure_group()
+    return True
+
+
 def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     """Carry the scene's settings into an existing set-up: which maps, which sky. Failures become notes."""
     setup = find_setup(scene)
     if setup is None:
         return
+    repair(scene, thorough=False)
     disk_sync.refresh(scene)
     try:
         point_at_maps(scene)
@@ -112,7 +131,8 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
 
 def takes_sky_from_settings(setup: Setup) -> bool:
     """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
-    links = setup.group.inputs["Environment"].links
+    socket = setup.group.inputs.get("Environment")
+    links = [] if socket is None else socket.links
     return setup.sky is not None and any(link.from_node == setup.sky for link in links)
 
 
@@ -153,7 +173,9 @@ def _follow(
     fixed: bool,
 ) -> None:
     """Drive a socket of the group by a World's value; without a path, write a `fixed` value once."""
-    socket = setup.group.inputs[socket_name]
+    socket = setup.group.inputs.get(socket_name)
+    if socket is None:
+        return
     is_vector = not isinstance(value, float)
     socket_path = socket.path_from_id("default_value")
     animation = setup.tree.animation_data

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: ``python -m physics bake``, ``render`` and ``verify``."""
+"""The command line: ``python -m physics bake``, ``render``, ``verify`` and ``accuracy``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import disk_command, verify_command
+import numpy as np
+
+from . import accuracy_command, disk_command, verify_command
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
 from .errors import BlackHoleError
 from .exr import read_exr, write_exr
@@ -30,6 +32,9 @@ from .warp_map_file import read_warp_map, write_warp_map
 
 # Motions as they are spelled on a command line; "velocity" has no short form there.
 ORBITS = {motion.replace("_", "-"): motion for motion in MOTIONS if motion != "velocity"}
+
+# What infinities in a sky are taken as: the largest half-precision number, which they were once above.
+BRIGHTEST = 65504.0
 
 PICTURE_ENDINGS = (".png", ".exr")
 
@@ -103,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     verifying = commands.add_parser("verify", help="read maps and disk passes whole, and say which hold")
     verifying.set_defaults(run=verify_command.verify)
     verify_command.add_options(verifying)
+    accuracy_command.add_command(commands, _ProgressPrinter)
     return parser
 
 
@@ -168,6 +174,14 @@ def _render(options: argparse.Namespace) -> None:
     warp_map = read_warp_map(options.map)
     camera = warp_map.metadata["parameters"]["camera"]
     environment, _ = read_exr(options.sky)
+    broken = ~np.isfinite(environment)
+    if broken.any():
+        count = int(broken.any(axis=-1).sum())
+        print(
+            f"note: {count} pixels of the sky are no finite numbers; they are taken as black or very bright",
+            file=sys.stderr,
+        )
+        environment = np.nan_to_num(environment, nan=0.0, posinf=BRIGHTEST, neginf=0.0)
     if environment.shape[1] != 2 * environment.shape[0]:
         print("note: the sky is not twice as wide as high; is it an equirectangular panorama?", file=sys.stderr)
     picture = render(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .checks import number, shown, whole
 from .errors import BlackHoleError
 from .rays import Array
 from .sphere import by_component, cos_sin
@@ -20,10 +21,14 @@ from .sphere import by_component, cos_sin
 # Pictures beyond this are a mistake; refusing them beats running out of memory.
 LARGEST_SIDE = 65536
 
+# Lengths of lenses and sensors, millimetres, ratios of pixels, and shifts beyond which arithmetic would not hold.
+SHORTEST, LONGEST = 1e-6, 1e6
+
 SENSOR_FITS = ("AUTO", "HORIZONTAL", "VERTICAL")
 
 
 def _check_size(width: int, height: int) -> None:
+    width, height = whole(width, "the picture's width"), whole(height, "the picture's height")
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         raise BlackHoleError(
             f"The picture's size is {width} x {height}; each side must be between 1 and {LARGEST_SIDE} pixels."
@@ -68,19 +73,21 @@ class PerspectiveCamera:
 
     def __post_init__(self) -> None:
         _check_size(self.width, self.height)
-        lengths = (
-            self.focal_length,
-            self.sensor_width,
-            self.sensor_height,
-            self.pixel_aspect_x,
-            self.pixel_aspect_y,
-        )
-        if not all(math.isfinite(length) and length > 0.0 for length in lengths):
-            raise BlackHoleError("The camera's focal length, sensor and pixel aspect must be positive numbers.")
-        if not (math.isfinite(self.shift_x) and math.isfinite(self.shift_y)):
-            raise BlackHoleError("The camera's lens shift must be a finite number.")
+        for name in ("focal_length", "sensor_width", "sensor_height", "pixel_aspect_x", "pixel_aspect_y"):
+            length = number(getattr(self, name), f"the camera's {name.replace('_', ' ')}")
+            if not SHORTEST <= length <= LONGEST:
+                raise BlackHoleError(
+                    "The camera's focal length, sensor and pixel aspect must be positive numbers, from "
+                    f"{SHORTEST:g} to {LONGEST:g}."
+                )
+            object.__setattr__(self, name, length)
+        for name in ("shift_x", "shift_y"):
+            shift = number(getattr(self, name), "the camera's lens shift")
+            if not abs(shift) <= LONGEST:
+                raise BlackHoleError(f"The camera's lens shift must be a finite number, up to {LONGEST:g}.")
+            object.__setattr__(self, name, shift)
         if self.sensor_fit not in SENSOR_FITS:
-            raise BlackHoleError(f"The sensor fit is '{self.sensor_fit}'; choose one of {', '.join(SENSOR_FITS)}.")
+            raise BlackHoleError(f"The sensor fit is {shown(self.sensor_fit)}; choose one of {', '.join(SENSOR_FITS)}.")
 
     @classmethod
     def from_field_of_view(cls, width: int, height: int, vertical: float) -> PerspectiveCamera:
@@ -91,6 +98,7 @@ class PerspectiveCamera:
         BlackHoleError
             Unless 0 < vertical < pi, or for a size out of range.
         """
+        vertical = number(vertical, "the field of view")
         if not 0.0 < vertical < math.pi:
             raise BlackHoleError(
                 f"The field of view is {math.degrees(vertical):g} degrees; it must be between 0 and 180 degrees."
@@ -176,6 +184,9 @@ class PanoramaCamera:
             ("latitude", self.latitude_min, self.latitude_max, math.pi / 2),
             ("longitude", self.longitude_min, self.longitude_max, math.pi),
         ):
+            low, high = (number(each, f"the panorama's {name}") for each in (low, high))
+            object.__setattr__(self, f"{name}_min", low)
+            object.__setattr__(self, f"{name}_max", high)
             # Blender keeps these as single-precision numbers, which may lie just beyond the float64 limit.
             if not -limit * (1 + 1e-6) <= low < high <= limit * (1 + 1e-6):
                 raise BlackHoleError(

@@ -36,6 +36,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import number
+from .errors import BlackHoleError
+
 SECOND_RADIATION_CONSTANT = 0.014387768775
 """h c / k_B in metre kelvin (CODATA 2018; exact by the SI's definitions, rounded to the digits written)."""
 
@@ -44,6 +47,13 @@ CHANNEL_WAVELENGTHS = (611.4e-9, 549.1e-9, 464.3e-9)
 
 DEFAULT_TEMPERATURE = 6500.0
 """Sky temperature (kelvin) whose black body is closest to the D65 white of the picture's colour space."""
+
+# Where arithmetic holds: nothing that is seen comes near.
+LARGEST_SHIFT = 1e100
+COLDEST, HOTTEST = 1.0, 1e9
+LARGEST_AMOUNT = 100.0
+# Of the logarithm of a gain.
+MOST = 700.0
 
 
 def _log_of_exp_minus_one(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -78,8 +88,9 @@ def redshift_gain(
 
     Raises
     ------
-    ValueError
-        If `temperature` or any of `one_plus_z` is not positive.
+    BlackHoleError
+        For a `temperature` or any `one_plus_z` that is not positive, or amounts that are no finite numbers; and for
+        values so far out that no answer could be written down.
 
     Notes
     -----
@@ -88,14 +99,20 @@ def redshift_gain(
     """
     ratio: NDArray[np.float64] = np.asarray(one_plus_z, dtype=np.float64)
     shift = ratio[..., np.newaxis]
-    if not np.all(shift > 0.0):
-        raise ValueError("1 + z must be positive everywhere: give the frequency ratio source / camera.")
-    if not temperature > 0.0:
-        raise ValueError(f"The sky's temperature is {temperature} K, it must be positive.")
+    if not np.all((shift > 0.0) & (shift >= 1.0 / LARGEST_SHIFT) & (shift <= LARGEST_SHIFT)):
+        raise BlackHoleError("1 + z must be positive everywhere: give the frequency ratio source / camera.")
+    temperature = number(temperature, "the sky's temperature")
+    if not COLDEST <= temperature <= HOTTEST:
+        raise BlackHoleError(
+            f"The sky's temperature is {temperature:g} K, it must be positive, from {COLDEST:g} to {HOTTEST:g} K."
+        )
+    for amount in (colour_amount, brightness_amount):
+        if not abs(number(amount, "an amount of redshift")) <= LARGEST_AMOUNT:
+            raise BlackHoleError(f"An amount of redshift is {amount:g}; give it a value from 0 to 1.")
     wavelengths: NDArray[np.float64] = np.asarray(CHANNEL_WAVELENGTHS, dtype=np.float64)
     x = SECOND_RADIATION_CONSTANT / (wavelengths * temperature)
     planck_ratio_log = _log_of_exp_minus_one(x) - _log_of_exp_minus_one(x * shift)
     shift_log = np.log(shift)
     exponent = 4.0 * (colour_amount - brightness_amount) * shift_log + colour_amount * planck_ratio_log
-    gain: NDArray[np.float64] = np.asarray(np.exp(exponent), dtype=np.float64)
+    gain: NDArray[np.float64] = np.asarray(np.exp(np.clip(exponent, -MOST, MOST)), dtype=np.float64)
     return gain

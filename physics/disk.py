@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .checks import number, switch, whole
 from .disk_tracer import DEFAULT_CROSSINGS, check_disk_settings
 from .errors import BlackHoleError
 from .metric import horizon_radius, isco_radius
@@ -38,6 +39,13 @@ class Disk:
     inner_radius: float | None = None
     outer_radius: float = DEFAULT_OUTER_RADIUS
     retrograde: bool = False
+
+    def __post_init__(self) -> None:
+        inner = self.inner_radius
+        object.__setattr__(self, "crossings", whole(self.crossings, "the number of crossings"))
+        object.__setattr__(self, "inner_radius", None if inner is None else number(inner, "the disk's inner radius"))
+        object.__setattr__(self, "outer_radius", number(self.outer_radius, "the disk's outer radius"))
+        object.__setattr__(self, "retrograde", switch(self.retrograde, "whether the disk is retrograde"))
 
     def radii(self, spin: float) -> tuple[float, float]:
         """Return the inner and the outer radius around a hole of this spin, units of M."""

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .checks import shown
 from .errors import BlackHoleError
 from .metric import check_spin, isco_radius
 from .rays import Array
@@ -98,9 +99,11 @@ def relative_flux(
         For a profile that there is not.
     """
     r = np.asarray(radius, dtype=np.float64)
+    if not isinstance(profile, str):
+        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
     if profile == "power_law":
         return np.minimum(inner / r, 1.0) ** exponent
     if profile != "novikov_thorne":
-        raise BlackHoleError(f"There is no temperature profile '{profile}'; choose one of {', '.join(PROFILES)}.")
+        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
     peak = page_thorne_flux(spin, peak_radius(spin, retrograde), retrograde)
     return page_thorne_flux(spin, r, retrograde) / peak

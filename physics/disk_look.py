@@ -8,10 +8,13 @@ artist's disk without motion, to 1, physics: temperature g^colour T, brightness 
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from .checks import finite
 from .disk import Disk
 from .disk_flux import relative_flux
 from .disk_texture import moving_texture
@@ -20,6 +23,15 @@ from .rays import Array
 from .star_colour import black_body_colour
 
 BOLOMETRIC, MONOCHROMATIC = 4, 3
+
+# What settings may be; amounts and shares are from 0 to 1.
+RANGES = {
+    **dict.fromkeys(("doppler_colour", "doppler_brightness", "colour_variation", "falloff"), (0.0, 1.0)),
+    **dict.fromkeys(("opacity", "streaks", "clumps", "inner_softness", "outer_softness"), (0.0, 1.0)),
+    "exponent": (0.0, 20.0),
+    "exposure": (-32.0, 32.0),
+    "gain": (1.0, 8.0),
+}
 
 # Temperatures between which colours are tabulated, kelvin, evenly in their logarithm.
 COLDEST, HOTTEST, COLOURS = 500.0, 60_000.0, 512
@@ -64,6 +76,9 @@ class DiskLook:
 
     def validate(self) -> None:
         """Raise BlackHoleError, with a sentence for the user, for a look that cannot be."""
+        for field in dataclasses.fields(self):
+            if field.name != "profile":
+                finite(getattr(self, field.name), f"the disk's {field.name.replace('_', ' ')}")
         relative_flux(self.profile, 0.0, 10.0, 6.0)
         if self.beaming not in (BOLOMETRIC, MONOCHROMATIC):
             raise BlackHoleError(f"The power of g in the brightness is {self.beaming}; choose 4 or 3.")
@@ -72,10 +87,13 @@ class DiskLook:
                 f"The disk's temperature is {self.temperature:g} K; give it a value between {COLDEST:g} and "
                 f"{HOTTEST:g} K."
             )
-        for name in ("doppler_colour", "doppler_brightness", "opacity", "streaks", "clumps", "colour_variation"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise BlackHoleError(f"The disk's {name.replace('_', ' ')} is {value:g}; give it a value from 0 to 1.")
+        for field in dataclasses.fields(self):
+            low, high = RANGES.get(field.name, (-math.inf, math.inf))
+            value = getattr(self, field.name)
+            if field.name in RANGES and not low <= value <= high:
+                raise BlackHoleError(
+                    f"The disk's {field.name.replace('_', ' ')} is {value:g}; give it a value from {low:g} to {high:g}."
+                )
 
 
 PRESETS: dict[str, DiskLook] = {

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import whole
 from .crossings import Crossings, LightAtDisk, cross_plane, split_by_energy
 from .errors import BlackHoleError
 from .observer import Observer
@@ -165,6 +166,7 @@ def trace_disk(
 
 def check_disk_settings(crossings: int, method: str) -> None:
     """Raise BlackHoleError for a number of crossings or a method that cannot be used for a disk."""
+    crossings = whole(crossings, "the number of crossings")
     if not 1 <= crossings <= MOST_CROSSINGS:
         raise BlackHoleError(f"The number of crossings is {crossings}; give it a value between 1 and {MOST_CROSSINGS}.")
     if method not in DISK_METHODS:

@@ -17,11 +17,10 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from . import exr_header
 from .errors import ImageFileError
 
 PathLike = str | os.PathLike[str]
-
-EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 # Names of files that are being written, or that a process was writing when it was killed.
 _TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.tmp(\.[^.]+)")
@@ -192,14 +191,16 @@ def read_exr_header(path: PathLike) -> dict[str, Any]:
 def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
     try:
         data = Path(path).read_bytes() if not header_only else None
-        with open(path, "rb") as stream:
-            magic = stream.read(4)
+        with io.BytesIO(data) if data is not None else open(path, "rb") as stream:
+            size = stream.seek(0, os.SEEK_END)
+            stream.seek(0)
+            exr_header.check(stream, size, whole=not header_only)
     except FileNotFoundError as error:
         raise ImageFileError(f"{path} does not exist.") from error
     except OSError as error:
         raise ImageFileError(f"Cannot read {path}: {_reason(error)}.") from error
-    if magic != EXR_MAGIC:
-        raise ImageFileError(f"{path} is not an OpenEXR file.")
+    except exr_header.BadHeader as error:
+        raise ImageFileError(f"{path} {error}.") from error
     try:
         source: Any = str(path) if data is None else io.BytesIO(data)
         with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from . import disk_pass_file, exit_map_file, warp_map_file
 from .errors import ImageFileError, WarpMapError
-from .exr import EXR_MAGIC, PathLike, read_exr_header
+from .exr import PathLike, read_exr_header
+from .exr_header import MAGIC
 from .map_file import ATTRIBUTE_FORMAT, MapFormat
 
 # Readers that check every pixel, by the format that they read.
@@ -67,8 +68,8 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
         return Finding(State.MISSING, f"The {noun} {path} is missing")
     try:
         with path.open("rb") as stream:
-            magic = stream.read(len(EXR_MAGIC))
-        if len(magic) == len(EXR_MAGIC) and magic != EXR_MAGIC:
+            magic = stream.read(len(MAGIC))
+        if len(magic) == len(MAGIC) and magic != MAGIC:
             return Finding(State.FOREIGN, f"{path} is not an OpenEXR file")
         stamp = read_exr_header(path).get(ATTRIBUTE_FORMAT)
         if stamp_kind(stamp) is not kind:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .errors import ImageFileError, WarpMapError
 from .exr import PathLike, read_channels, read_exr_header, write_channels
+from .shot import WarpMapParameters
 
 CHANNELS = ("R", "G", "B", "A")
 
@@ -116,12 +117,13 @@ class MapFormat:
         try:
             parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
             counts = json.loads(header[ATTRIBUTE_COUNTS])
-            width, height = (
-                parameters["camera"][side] * parameters["supersampling"] for side in ("width", "height")
-            )
+            width, height = WarpMapParameters.from_metadata(parameters).map_size
+            readable = isinstance(counts["unresolved"], int) and all(type(each) is int for each in counts.values())
             identity = str(header[ATTRIBUTE_HASH])
-        except (KeyError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
             raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read.")) from error
+        if not readable:
+            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read."))
         if list(header["size"]) != [width, height * self.pictures]:
             raise WarpMapError(advice(f"{Path(path)} is damaged: its size is not that of its parameters."))
         further = {name: str(header.get(name, "")) for name in self.attributes}

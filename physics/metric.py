@@ -13,7 +13,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from .checks import number
 from .errors import BlackHoleError
+
+# Beyond any scene; formulae hold powers of the radius, up to the eighth, that must stay finite.
+LARGEST_RADIUS = 1e12
 
 
 class MetricFunctions(NamedTuple):
@@ -38,7 +42,7 @@ def check_spin(spin: float) -> float:
     BlackHoleError
         Unless -1 < spin < 1: a spin of 1 or more has no horizon to cast a shadow.
     """
-    spin = float(spin)
+    spin = number(spin, "the spin")
     if not -1.0 < spin < 1.0:  # also catches NaN
         raise BlackHoleError(f"The spin is {spin:g}; give it a value above -1 and below 1.")
     return spin
@@ -65,6 +69,10 @@ def metric_functions(spin: float, r: float, theta: float) -> MetricFunctions:
         At or inside the horizon, where no observer can stay and the lapse is not real.
     """
     horizon = horizon_radius(spin)
+    if not r <= LARGEST_RADIUS:
+        raise BlackHoleError(f"The distance from the hole is {r:g} M; it must be at most {LARGEST_RADIUS:g} M.")
+    if not math.isfinite(theta):
+        raise BlackHoleError(f"The polar angle is {theta:g}; it must be a finite number.")
     if not r > horizon:
         raise BlackHoleError(
             f"The camera is inside the black hole: its distance is {r:.4g} M and the horizon lies at "

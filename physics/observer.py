@@ -10,8 +10,10 @@ import math
 import warnings
 from dataclasses import dataclass
 
+from .checks import finite, vector
 from .errors import BlackHoleError, UnstableOrbitWarning
 from .metric import (
+    LARGEST_RADIUS,
     check_spin,
     ergosphere_radius,
     isco_radius,
@@ -33,7 +35,7 @@ class Observer:
     Parameters
     ----------
     r : float
-        Boyer-Lindquist radius, units of M, > 0 (outside the horizon: checked where the spin is known).
+        Boyer-Lindquist radius, units of M, > 0 and up to 1e12 (outside the horizon: checked where the spin is known).
     theta, phi : float
         Boyer-Lindquist angles in radians; theta in [0, pi], 0 along the spin axis.
     beta : float
@@ -55,17 +57,15 @@ class Observer:
     direction: Direction = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        values = (self.r, self.theta, self.phi, self.beta, *self.direction)
-        if len(self.direction) != 3:
-            raise BlackHoleError(f"The direction of motion has {len(self.direction)} components; give three.")
-        try:
-            finite = all(math.isfinite(value) for value in values)
-        except TypeError:
-            finite = False
-        if not finite:
-            raise BlackHoleError(f"The observer's position and motion must be finite numbers, not {values}.")
-        if self.r <= 0.0:
-            raise BlackHoleError(f"The observer's radius is {self.r:g}; it must be positive.")
+        for name, what in (("r", "radius"), ("theta", "theta"), ("phi", "phi"), ("beta", "speed")):
+            object.__setattr__(self, name, finite(getattr(self, name), f"the observer's {what}"))
+        object.__setattr__(self, "direction", vector(self.direction, "the direction of motion"))
+        if not all(math.isfinite(component) for component in self.direction):
+            raise BlackHoleError("The direction of motion must be three finite numbers.")
+        if not 0.0 < self.r <= LARGEST_RADIUS:
+            raise BlackHoleError(
+                f"The observer's radius is {self.r:g}; it must be positive and at most {LARGEST_RADIUS:g} M."
+            )
         if not 0.0 <= self.theta <= math.pi:
             raise BlackHoleError(f"The observer's theta is {self.theta:g}; it must lie between 0 and pi.")
         if not 0.0 <= self.beta < 1.0:

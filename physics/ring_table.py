@@ -118,11 +118,12 @@ class RingTable:
             sum(weight * each.take(row + i) for i, weight in enumerate(across))
             for each in (self._edge, self._scale, self._step)
         )
-        place = np.arcsinh((away - edge) / scale) / step - self._first
+        place: Array = np.arcsinh((away - edge) / scale) / step - self._first
         inside = (place >= 0.0) & (place < self._columns - len(AROUND) + 1.0)
         place = np.where(inside, place, 0.0)
         column = place.astype(np.intp)
-        along = lagrange_weights(place - column, AROUND)
+        part = place - column
+        along = lagrange_weights(part, AROUND)
         result = np.zeros((channels, len(away)))
         for i, weight in enumerate(across):
             first = (row + i) * self._columns + column

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .checks import number, shown, three, vector, whole
 from .disk import Disk
 from .errors import BlackHoleError
 from .metric import check_spin, isco_radius, metric_functions
@@ -82,11 +83,18 @@ class WarpMapParameters:
     disk: Disk | None = None
 
     def __post_init__(self) -> None:
+        for name in ("spin", "tolerance", "interpolation"):
+            object.__setattr__(self, name, number(getattr(self, name), f"the {name}"))
         for name in ("camera_position", "velocity"):
-            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+            object.__setattr__(self, name, vector(getattr(self, name), f"the {name.replace('_', ' ')}"))
         for name in ("camera_to_hole", "hole_to_world"):
-            rows = tuple(tuple(float(value) for value in row) for row in getattr(self, name))
+            rows = tuple(vector(row, f"the matrix {name}") for row in three(getattr(self, name), f"the matrix {name}"))
             object.__setattr__(self, name, rows)
+        object.__setattr__(self, "supersampling", whole(self.supersampling, "the supersampling"))
+        if not isinstance(self.camera, PerspectiveCamera | PanoramaCamera):
+            raise BlackHoleError(f"The camera is {shown(self.camera)}; give a PerspectiveCamera or a PanoramaCamera.")
+        if not (self.disk is None or isinstance(self.disk, Disk)):
+            raise BlackHoleError(f"The disk is {shown(self.disk)}; give a Disk, or None for none.")
 
     def validate(self) -> None:
         """Raise BlackHoleError, with a sentence for the user, when no map can be made from these parameters."""
@@ -103,7 +111,7 @@ class WarpMapParameters:
             raise BlackHoleError("The camera's place and velocity must be finite numbers.")
         for name in ("camera_to_hole", "hole_to_world"):
             matrix = np.array(getattr(self, name))
-            proper = matrix.shape == (3, 3) and np.linalg.det(matrix) > 0.0
+            proper = bool((np.abs(matrix) < 2.0).all()) and np.linalg.det(matrix) > 0.0
             if not proper or np.abs(matrix @ matrix.T - np.eye(3)).max() > ROTATION_TOLERANCE:
                 raise BlackHoleError(f"The matrix {name} is not a rotation.")
         metric_functions(self.spin, self.radius, 0.5)  # inside the horizon is the first thing to say
@@ -136,6 +144,8 @@ class WarpMapParameters:
         BlackHoleError
             Where this motion is impossible: static inside the ergosphere, faster than light, inside the horizon.
         """
+        if not isinstance(self.motion, str):
+            raise BlackHoleError(f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.")
         x, y, z = self.camera_position
         r, theta, phi = self.radius, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
         match self.motion:
@@ -149,7 +159,7 @@ class WarpMapParameters:
                 return Observer.free_fall(self.spin, r, theta, phi)
             case "velocity":
                 return self._moving_observer(r, theta, phi)
-        raise BlackHoleError(f"There is no motion '{self.motion}'; choose one of {', '.join(MOTIONS)}.")
+        raise BlackHoleError(f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.")
 
     def _moving_observer(self, r: float, theta: float, phi: float) -> Observer:
         local = spherical_triad(theta, phi) @ np.array(self.velocity)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boyer_lindquist import PrintedSystem
+from .checks import number, shown, whole
 from .closed_form import sky_directions
 from .errors import BlackHoleError, Cancelled
 from .mino import DirectRays, TurningRays
@@ -267,7 +268,7 @@ def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array
     """Return viewing directions broadcast against each other, or raise BlackHoleError for what cannot be one."""
     try:
         theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
     if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
         raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
@@ -276,13 +277,14 @@ def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array
 
 def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS) -> None:
     """Raise BlackHoleError for a tolerance, method or number of steps that cannot be used."""
+    tolerance, max_steps = number(tolerance, "the tolerance"), whole(max_steps, "the number of steps")
     if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
         raise BlackHoleError(
             f"The tolerance is {tolerance:g}; give it a value between {SMALLEST_TOLERANCE:g} and "
             f"{LARGEST_TOLERANCE:g} radians."
         )
-    if method not in METHODS:
-        raise BlackHoleError(f"There is no method '{method}'; choose one of {', '.join(METHODS)}.")
+    if not isinstance(method, str) or method not in METHODS:
+        raise BlackHoleError(f"There is no method {shown(method)}; choose one of {', '.join(METHODS)}.")
     if max_steps < 1:
         raise BlackHoleError(f"The number of steps is {max_steps}; it must be at least 1.")
 

@@ -72,7 +72,7 @@ for frame, x in ((1, 9.0), (2, 5.0), (3, 0.1)):
         ("bpy.ops.umbra.bake_animation(); scene.umbra.auto_bake = False; hole.umbra.spin = 0.5", "is out of date"),
         ("bpy.ops.umbra.bake_animation(); scene.umbra.auto_bake = False\n"
          "for each in folder.rglob('*_0001.exr'): each.write_bytes(each.read_bytes()[:-9])",
-         "0001.exr is damaged or cut short"),
+         "0001.exr is cut short"),
         ("scene.umbra.method = 'cash-karp-printed'; scene.umbra.quality = 'REFERENCE'\n"
          "scene.camera.location = (0, 0, 9); scene.camera.rotation_euler = (0.0, 0.0, 0.0)",
          "could not be resolved by the method \"Boyer-Lindquist\""),

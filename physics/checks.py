@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What comes from outside, as the plain numbers that formulae take: anything else is refused in one sentence."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any
+
+from .errors import BlackHoleError
+
+LONGEST = 40
+
+
+def number(value: Any, what: str) -> float:
+    """Return a single real number as a float, NaN and infinities included.
+
+    Parameters
+    ----------
+    value : object
+        An int, a float, numpy's of either, or anything else that is one real number; not text.
+    what : str
+        How a message names it, with its article.
+
+    Raises
+    ------
+    BlackHoleError
+        It is none.
+    """
+    if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) != 0:
+        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.")
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.") from error
+
+
+def finite(value: Any, what: str) -> float:
+    """Return a single finite number as a float.
+
+    Raises
+    ------
+    BlackHoleError
+        It is none.
+    """
+    result = number(value, what)
+    if not math.isfinite(result):
+        raise BlackHoleError(f"{_begin(what)} is {result:g}; give it as a finite number.")
+    return result
+
+
+def three(value: Any, what: str) -> tuple[Any, Any, Any]:
+    """Return the three things that a value holds.
+
+    Raises
+    ------
+    BlackHoleError
+        It does not hold three.
+    """
+    try:
+        parts = [] if isinstance(value, str | bytes | bytearray) else list(value)
+    except TypeError:
+        parts = []
+    if len(parts) != 3:
+        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as three of a kind.")
+    return parts[0], parts[1], parts[2]
+
+
+def vector(value: Any, what: str) -> tuple[float, float, float]:
+    """Return three numbers as floats, NaN and infinities included.
+
+    Raises
+    ------
+    BlackHoleError
+        They are none.
+    """
+    x, y, z = (number(part, what) for part in three(value, what))
+    return x, y, z
+
+
+def switch(value: Any, what: str) -> bool:
+    """Return yes or no as a bool.
+
+    Raises
+    ------
+    BlackHoleError
+        It is something else.
+    """
+    if type(value).__name__ in ("bool", "bool_"):
+        return bool(value)
+    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as True or False.")
+
+
+def whole(value: Any, what: str) -> int:
+    """Return a whole number as an int; 3.0 is not one.
+
+    Raises
+    ------
+    BlackHoleError
+        It is none.
+    """
+    try:
+        if getattr(value, "ndim", 0) == 0 and type(value) is not bool:
+            return operator.index(value)
+    except TypeError:
+        pass
+    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as a whole number.")
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it, on one line and not too long."""
+    if isinstance(value, int) and abs(value) > 10**LONGEST:
+        return "a huge number"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}.."
+
+
+def _begin(what: str) -> str:
+    return what[:1].upper() + what[1:]

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that earlier versions of the add-on saved: opened, brought up to date, and rendered as they were."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from compositor_scene import MapArrays
+from saved_scene import ARTISTS_NODE, GROUP, HOLE, ROTATION, SCENE, build, compositor_of, sky_pixels
+from small_scene import render
+
+import physics
+from physics import exr, reference_render
+
+SAVED = Path(__file__).resolve().parents[1] / "data" / "saved_files"
+FILES = sorted(SAVED.glob("*.blend"))
+
+# What group_1 is: the first whole version of the add-on, whose node group had no input for a disk.
+FIRST = SAVED / "group_1.blend"
+LATEST = SAVED / "0.1.0.blend"
+
+LARGEST_FILE = 400_000
+MACHINE_PATH = re.compile(rb"(?:/home/|/Users/|/work/|/var/|/opt/|[A-Z]:\\Users)[ -~]*")
+
+
+def opened(path: Path, tmp_path: Path) -> bpy.types.Scene:
+    """The scene of a file, with maps of its own folder: nothing is written beside the fixture."""
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene = bpy.context.scene
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    return scene
+
+
+def group_of(scene: bpy.types.Scene) -> bpy.types.Node:
+    (found,) = [node for node in compositor_of(scene).nodes if node.get("umbra_role") == "group"]
+    return found
+
+
+def links_of(scene: bpy.types.Scene) -> set[tuple[str, str, str, str]]:
+    return {
+        (link.from_node.bl_idname, link.from_socket.name, link.to_node.bl_idname, link.to_socket.name)
+        for link in compositor_of(scene).links
+    }
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_settings_and_links_are_kept_and_groups_brought_up_to_date(
+    addon_module: Callable[[str], ModuleType], tmp_path: Path, path: Path
+) -> None:
+    scene = opened(path, tmp_path)
+    hole = scene.umbra.active_hole
+    assert {name: getattr(hole.umbra, name) for name in HOLE} == pytest.approx(HOLE)
+    assert {name: getattr(scene.umbra, name) for name in SCENE} == SCENE
+    group = group_of(scene)
+    assert {name: group.inputs[name].default_value for name in GROUP} == pytest.approx(GROUP)
+    assert tuple(group.inputs["Environment Rotation"].default_value) == pytest.approx(ROTATION)
+    node_group = addon_module("node_group")
+    assert node_group.is_current(group.node_tree)
+    assert group.node_tree[node_group.VERSION_KEY] == node_group.GROUP_VERSION
+    assert [tree.name for tree in bpy.data.node_groups if node_group.is_group(tree)] == [node_group.GROUP_NAME]
+    assert "Disk" in group.inputs
+    links = links_of(scene)
+    assert ("CompositorNodeRLayers", "Image", "CompositorNodeGroup", "Render") in links
+    assert ("CompositorNodeGroup", "Image", "CompositorNodeExposure", "Image") in links
+    assert compositor_of(scene).nodes[ARTISTS_NODE].outputs["Image"].is_linked
+    # Opened once more after saving, nothing changes any more.
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "again.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "again.blend"))
+    assert links_of(bpy.context.scene) == links
+    assert node_group.is_current(group_of(bpy.context.scene).node_tree)
+
+
+def test_the_first_version_really_is_of_another_group(addon_module: Callable[[str], ModuleType]) -> None:
+    """Without this the test above might test nothing: what the file itself holds, without its handlers."""
+    with bpy.data.libraries.load(str(FIRST)) as (source, target):
+        target.node_groups = [name for name in source.node_groups if name.startswith("Umbra Black Hole")]
+        target.scenes = source.scenes[:1] if not target.node_groups else []
+    groups = [tree for tree in bpy.data.node_groups if "umbra_version" in tree]
+    assert [tree["umbra_version"] for tree in groups] == [1]
+    assert not any(item.name == "Disk" for item in groups[0].interface.items_tree)
+    assert addon_module("node_group").GROUP_VERSION > 1
+
+
+def test_the_first_version_renders_as_numpy_does(tmp_path: Path) -> None:
+    """Every pixel, against the reference in float64 from the map that is baked and the sky that is packed."""
+    scene = opened(FIRST, tmp_path)
+    picture = render(scene, tmp_path / "picture.exr", exr)
+    (path,) = (tmp_path / "maps").glob("*.exr")
+    warp_map = physics.read_warp_map(path)
+    planes = np.stack([warp_map.theta, warp_map.phi, warp_map.one_plus_z, warp_map.visibility], axis=-1)
+    expected = reference_render.render(
+        MapArrays.of(planes),
+        sky_pixels(),
+        rotation=[float(np.float32(angle)) for angle in ROTATION],
+        strength=GROUP["Environment Strength"],
+        exposure=GROUP["Exposure"],
+        colour_amount=GROUP["Redshift Colour"],
+        brightness_amount=GROUP["Redshift Brightness"],
+        temperature=GROUP["Sky Temperature"],
+        output_size=(scene.render.resolution_x, scene.render.resolution_y),
+    ).image
+    # float32 in a dozen operations and in texture coordinates, of colours up to 10
+    np.testing.assert_allclose(picture[..., :3], expected[..., :3], rtol=0.0, atol=2e-4)
+    assert picture[..., :3].max() > 0.5
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_it_renders_as_the_same_scene_does_that_is_new(tmp_path: Path, path: Path) -> None:
+    """The scene is built again with this version: disk, artist's node and all."""
+    old = render(opened(path, tmp_path), tmp_path / "old.exr", exr)
+    scene = build(disk=path != FIRST)
+    scene.umbra.map_folder = str(tmp_path / "new maps")
+    new = render(scene, tmp_path / "new.exr", exr)
+    # Blender 5 keeps what the older one wrote; colours agree to float32's rounding.
+    np.testing.assert_allclose(old[..., :3], new[..., :3], rtol=1e-5, atol=1e-5)
+    assert np.ptp(old[..., 0]) > 0.1
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_files_are_small_and_name_no_machine(tmp_path: Path, path: Path) -> None:
+    assert path.stat().st_size < LARGEST_FILE
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    texts = [image.filepath for image in bpy.data.images] + [scene.render.filepath for scene in bpy.data.scenes]
+    texts += [library.filepath for library in bpy.data.libraries]
+    assert not any(MACHINE_PATH.search(text.encode()) for text in texts)
