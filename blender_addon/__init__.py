@@ -16,6 +16,7 @@ from . import (
     handlers,
     operators,
     panels,
+    preview_panel,
     properties,
 )
 
@@ -28,6 +29,7 @@ _CLASSES = (
     *farm_copy.CLASSES,
     *farm_templates.CLASSES,
     *accuracy_check.CLASSES,
+    *preview_panel.CLASSES,
 )
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
@@ -43,7 +45,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, handlers, command):
+        for module in (properties, operators, preview_panel, handlers, command):
             module.register()
             _undo.append(module.unregister)
     except BaseException:

@@ -31,6 +31,8 @@ if importlib.util.find_spec(f"{__package__}.physics") is not None:
         reference_render,
         star_sky,
         warp_map_file,
+        world_map,
+        world_map_file,
     )
 else:
     import physics  # type: ignore[no-redef]
@@ -55,6 +57,8 @@ else:
         reference_render,
         star_sky,
         warp_map_file,
+        world_map,
+        world_map_file,
     )
 
 __all__ = [
@@ -79,4 +83,6 @@ __all__ = [
     "reference_render",
     "star_sky",
     "warp_map_file",
+    "world_map",
+    "world_map_file",
 ]

@@ -17,10 +17,12 @@ from typing import TypeVar
 
 import bpy
 
-from . import lens_sync, maps, shot, sync
-from ._physics import claim, exit_map, exit_map_file, physics
+from . import lens_sync, maps, shot, stopping, sync, world_sync
+from ._physics import claim, exit_map, exit_map_file, physics, world_map, world_map_file
 from .compositor_tree import find_setup
 from .errors import SceneError
+
+Baked = physics.WarpMap | exit_map.ExitMap | world_map.WorldMap
 
 # What the maps of one bake or render have in common is kept here.
 _baker = physics.MapBaker()
@@ -79,9 +81,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def bake_map(
-    path: Path, parameters: "physics.WarpMapParameters"
-) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
+def bake_map(path: Path, parameters: "physics.WarpMapParameters") -> Generator[float, None, Baked]:
     """Bake one map, of the kind that its path says, into a file; yields the fraction done, and returns the map.
 
     Raises
@@ -94,13 +94,13 @@ def bake_map(
     return baked
 
 
-def _steps(
-    path: Path, parameters: "physics.WarpMapParameters"
-) -> Generator[float, None, "physics.WarpMap | exit_map.ExitMap"]:
+def _steps(path: Path, parameters: "physics.WarpMapParameters") -> Generator[float, None, Baked]:
     """Bake a map of the kind that its path says, once it is sure that it can be written."""
     prepare(path, parameters)
     if maps.kind_of(path) is maps.EXIT_MAP:
         return (yield from exit_map.bake_exit_map_steps(parameters))
+    if maps.kind_of(path) is maps.WORLD_MAP:
+        return (yield from world_map.world_map_steps(parameters))
     return (yield from _baker.steps(parameters))
 
 
@@ -109,8 +109,11 @@ def prepare(path: Path, parameters: "physics.WarpMapParameters") -> None:
     maps.prepare(path, parameters.map_size, 1 + len(maps.pass_paths(path, parameters)))
 
 
-def _save(path: Path, baked: "physics.WarpMap | exit_map.ExitMap") -> None:
-    """Write a map of either kind; this may run in a thread of its own, and touches nothing of Blender's."""
+def _save(path: Path, baked: Baked) -> None:
+    """Write a map of any kind; this may run in a thread of its own, and touches nothing of Blender's."""
+    if isinstance(baked, world_map.WorldMap):
+        world_map_file.write_world_map(path, baked)
+        return
     if not isinstance(baked, exit_map.ExitMap):
         _write_all(path, baked)
         return
@@ -151,9 +154,7 @@ def provide_map(
     noun = maps.kind_of(path).noun
     with claim.Claims() as claims:
         if not take(claims, path, parameters):
-            print(f"Umbra: waiting for the {noun} of frame {frame}, which {claims.holder(path)} bakes", flush=True)
-            while not take(claims, path, parameters):
-                time.sleep(POLL)
+            _wait_for_claim(claims, path, parameters, f"the {noun} of frame {frame}")
         if maps.is_fresh(path, parameters):
             return
         where = " into a temporary folder (the file is not saved)" if maps.folder(scene).is_temporary else ""
@@ -162,9 +163,29 @@ def provide_map(
             claims.beat()
 
 
+def _wait_for_claim(
+    claims: claim.Claims, path: Path, parameters: "physics.WarpMapParameters", what: str
+) -> None:
+    """Claim a map once the process that is baking it has ended, or is found dead.
+
+    Raises
+    ------
+    SceneError
+        The process was asked to end.
+    """
+    print(f"Umbra: waiting for {what}, which {claims.holder(path)} bakes", flush=True)
+    with stopping.stoppable() as stop:
+        while not take(claims, path, parameters):
+            if stop.asked:
+                raise SceneError(f"Stopped while waiting for {what}, which {claims.holder(path)} bakes.")
+            time.sleep(POLL)
+
+
 def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.WarpMapParameters":
     """What the map of a shot is made from, for the scene's output."""
     parameters = frame_shot.parameters
+    if world_sync.is_on(scene):
+        return world_map.world_parameters(parameters)
     return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
 
 
@@ -172,6 +193,9 @@ def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     """Where the map of a shot lies, or will lie."""
     if lens_sync.is_on(scene):
         return maps.exit_map_path(scene, frame_shot.hole_name, parameters_of(scene, frame_shot), frame_shot.frame)
+    if world_sync.is_on(scene):
+        size = parameters_of(scene, frame_shot).map_size
+        return maps.folder(scene).path / maps.world_map_name(scene, frame_shot.hole_name, size, frame_shot.frame)
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
 
 
@@ -331,6 +355,8 @@ def take(
     try:
         if not claims.take(path):
             return False
+        if not claims.owns(path):  # a bake beside this render is making it: its half files are alive
+            return True
         for one in (path, *maps.pass_paths(path, parameters)):
             for half in half_files.pop(one.name, ()):
                 half.unlink(missing_ok=True)
@@ -350,7 +376,7 @@ def naming(frame: int, count: int) -> Iterator[None]:
         raise SceneError(f"Frame {frame}: {error}") from error
 
 
-def _write(path: Path, baked: "physics.WarpMap | exit_map.ExitMap", frame: int, count: int) -> None:
+def _write(path: Path, baked: Baked, frame: int, count: int) -> None:
     with naming(frame, count):
         _save(path, baked)
 
@@ -362,6 +388,8 @@ def finish(scene_name: str) -> None:
     if scene is not None and find_setup(scene) is not None:
         sync.refresh(scene)
         sync.forget_loaded_map(scene)
+    if scene is not None and world_sync.is_on(scene):
+        world_sync.forget_loaded_map(scene)
 
 
 def drain(

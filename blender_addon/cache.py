@@ -115,7 +115,7 @@ class FolderNames:
         self.folder = maps.folder(scene).path
         self._pattern = re.compile(
             re.escape(maps.names_of(scene, hole_name))
-            + r"_(?P<size>\d+x\d+)_(?:disk(?P<crossing>\d+)_)?(?P<number>\d{4,7})(?P<exit>_exit_[0-9a-f]+)?\.exr"
+            + r"_(?P<size>\d+x\d+)_(?:disk(?P<crossing>\d+)_|world_)?(?P<number>\d{4,7})(?P<exit>_exit_[0-9a-f]+)?\.exr"
         )
         self.maps: list[tuple[str, Path]] = []
         """Maps and passes, of whatever size and frame, and the maps that they belong to."""

@@ -4,16 +4,15 @@
 import argparse
 import contextlib
 import json
-import signal
 import sys
 import traceback
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 import bpy
 
-from . import baking, cache, lens_sync, maps, shot
+from . import baking, cache, lens_sync, maps, shot, stopping
 from ._physics import frame_list, physics
 from .errors import MapFolderError, SceneError
 
@@ -22,9 +21,6 @@ NAME = "umbra"
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
 
 _handle: object = None
-
-# Set by a signal that asks the process to end.
-_stop_asked = False
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -44,7 +40,7 @@ def run(arguments: Sequence[str]) -> int:
             return FAILED
         out = Output(stream, quiet=stream is sys.stdout)
         try:
-            with _stoppable():
+            with stopping.stoppable() as out.stop:
                 scene = _scene_of(options)
                 status, summary = options.work(options, scene, _frames_of(options, scene), out)
         except KeyboardInterrupt:
@@ -65,6 +61,7 @@ class Output:
     def __init__(self, json_stream: TextIO | None, *, quiet: bool) -> None:
         self._json = json_stream
         self._people = sys.stderr if quiet else sys.stdout
+        self.stop = stopping.Stop()
 
     def line(self, text: str) -> None:
         """Print a line for people; where standard output is for JSON, on standard error."""
@@ -82,7 +79,10 @@ class Output:
         return FAILED
 
 
+# A command's exit status, and what its last line of JSON says.
 Outcome = tuple[int, dict[str, object]]
+
+Result = TypeVar("Result")
 
 
 def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
@@ -97,7 +97,7 @@ def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int]
             out.line(f"{progress.fraction:4.0%}  {progress.text}: {words[progress.outcome]}")
             out.event("frame", frame=progress.frame, outcome=progress.outcome, progress=round(progress.fraction, 4))
 
-    summary = _drain(baking.bake_frames(scene.name, frames, options.view_layer), tell)
+    summary = _drain(baking.bake_frames(scene.name, frames, options.view_layer), tell, out)
     out.line(summary.sentence())
     if summary.unresolved:
         out.line(f"{summary.unresolved} rays could not be resolved; choose another Method under Warp Maps.")
@@ -112,7 +112,7 @@ def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int]
 
 def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
     steps = cache.examine(scene.name, frames, options.view_layer, thorough=not options.quick)
-    listing = _drain(steps, _tenths(out, "checking"))
+    listing = _drain(steps, _tenths(out, "checking"), out)
     for each in listing.frames:
         note = f"  {each.fault}" if each.state in cache.FAULTY else ""
         note += f"  {each.baker} is baking it" if each.baker else ""
@@ -138,7 +138,7 @@ def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[in
 
 def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
     steps = cache.clean(scene.name, frames, options.view_layer, everything=options.all, dry_run=options.dry_run)
-    cleaning = _drain(steps, _tenths(out, "checking"))
+    cleaning = _drain(steps, _tenths(out, "checking"), out)
     for each in cleaning.removed:
         out.line(f"{'would remove' if options.dry_run else 'removed'} {each.path.name} ({each.reason})")
         out.event("file", path=str(each.path), reason=each.reason, bytes=each.size)
@@ -153,19 +153,23 @@ def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int
     }
 
 
-def _drain(steps: Generator[baking.Progress, None, object], tell: object) -> object:
+def _drain(
+    steps: Generator[baking.Progress, None, Result], tell: Callable[[baking.Progress], None], out: Output
+) -> Result:
+    """Run work to its end, unless the process is asked to end; `tell` hears of each step."""
     with contextlib.closing(steps):
         while True:
             try:
                 progress = next(steps)
             except StopIteration as end:
                 return end.value
-            if _stop_asked:
+            if out.stop.asked:
                 raise KeyboardInterrupt
             tell(progress)
 
 
-def _tenths(out: Output, verb: str) -> object:
+def _tenths(out: Output, verb: str) -> Callable[[baking.Progress], None]:
+    """What tells people of each tenth of the work."""
     told = -1
 
     def tell(progress: baking.Progress) -> None:
@@ -202,31 +206,6 @@ def _json_stream(target: str | None, stack: contextlib.ExitStack) -> TextIO | No
         raise MapFolderError(
             f"The JSON file {target} cannot be written ({(error.strerror or str(error)).lower()}): name another one."
         ) from error
-
-
-@contextlib.contextmanager
-def _stoppable() -> Iterator[None]:
-    """Let Ctrl-C, and a farm's request to end, stop the work between two steps; the second time it ends at once.
-
-    An exception out of a signal could come at any moment, in the middle of starting a thread as well.
-    """
-    global _stop_asked
-    _stop_asked = False
-
-    def stop(_signal: int, _frame: object) -> None:
-        global _stop_asked
-        _stop_asked = True
-        restore()
-
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        restore()
 
 
 def _frames(text: str) -> list[int]:

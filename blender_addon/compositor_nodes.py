@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 from ._physics import colour, reference_render
 from .node_helpers import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder, Value
@@ -91,7 +92,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
     with builder.frame("Environment"):
         environment = sample_bilinearly(builder, inputs.environment, u, v)
     with builder.frame("Redshift"):
-        gain = _redshift_gain(builder, channels.one_plus_z, inputs)
+        gain = redshift_gain(builder, channels.one_plus_z, inputs)
     with builder.frame("Sky"):
         factor = builder.math("MULTIPLY", builder.math("POWER", 2.0, inputs.exposure), inputs.strength)
         factor = builder.math("MULTIPLY", factor, channels.visibility)
@@ -218,7 +219,15 @@ def sample_bilinearly(builder: TreeBuilder, environment: Value, u: Value, v: Val
     return builder.select_vector(share_y, *mixed)
 
 
-def _redshift_gain(builder: TreeBuilder, one_plus_z: Socket, inputs: GroupInputs) -> Socket:
+class RedshiftInputs(Protocol):
+    """The sockets that say how light is shifted."""
+
+    redshift_colour: Socket
+    redshift_brightness: Socket
+    temperature: Socket
+
+
+def redshift_gain(builder: TreeBuilder, one_plus_z: Socket, inputs: RedshiftInputs) -> Socket:
     """Vector of the gains of red, green and blue; see `physics.colour` for the formula and where it is from.
 
     exp(4 (c - k) ln(1+z) + c (x - y + ln(1 - exp(-x)) - ln(1 - exp(-y)))), y = (1 + z) x: by logarithms, so

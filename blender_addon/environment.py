@@ -11,6 +11,9 @@ from mathutils import Euler
 from ._physics import exr, star_sky
 from .errors import SceneError
 
+# On a scene whose World is replaced by a lensed copy: the World itself.
+WORLD_BEFORE = "umbra_world_before"
+
 STAR_SKY_NAME = "Umbra Star Sky"
 STAR_SKY_HEIGHT = 2048
 _STAR_SKY_FILE = f"star_sky_{STAR_SKY_HEIGHT}.exr"
@@ -83,14 +86,14 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
 
 
 def read_world(scene: bpy.types.Scene) -> Sky:
-    """The sky that a scene's World shows.
+    """The sky that a scene's World shows, or the one that its lensed World was made from, as that places it now.
 
     Raises
     ------
     SceneError
         The World is missing, or is not an Environment Texture feeding a Background.
     """
-    world = scene.world
+    world = scene.get(WORLD_BEFORE, scene.world)
     if world is None:
         raise SceneError(
             f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.'
@@ -128,14 +131,26 @@ def read_world(scene: bpy.types.Scene) -> Sky:
             "can be taken over."
         )
     rotation, rotation_path = _mapping(texture)
+    strength, strength_path = background.inputs["Strength"].default_value, _input_path(background, "Strength")
+    if scene.world is not None and scene.world != world:
+        rotation = _value_at(scene.world, rotation_path, rotation)
+        strength = _value_at(scene.world, strength_path, strength)
     return Sky(
         image=texture.image,
         texture=texture,
-        rotation=rotation,
-        strength=background.inputs["Strength"].default_value,
+        rotation=tuple(rotation),
+        strength=strength,
         rotation_path=rotation_path,
-        strength_path=_input_path(background, "Strength"),
+        strength_path=strength_path,
     )
+
+
+def _value_at(world: bpy.types.World, path: str | None, otherwise: object) -> object:
+    """What a copy of a World has at a path of the World."""
+    try:
+        return otherwise if path is None else world.path_resolve(path)
+    except ValueError:  # the artist has taken the node out
+        return otherwise
 
 
 def read(scene: bpy.types.Scene) -> Sky:

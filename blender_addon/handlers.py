@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, shot, sync
+from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, preview, shot, sync, world_sync
 from ._physics import physics
 from .compositor_tree import check_linked, check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -55,6 +55,8 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
         return
     if lens_sync.is_on(scene):
         lens_sync.break_camera(scene)
+    elif world_sync.is_on(scene):
+        world_sync.point_at_nothing(scene)
     else:
         sync.point_at_nothing(scene)
     messages.warn(text)
@@ -71,6 +73,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     _told.discard(scene.name)
     _noted.discard(scene.name)
+    preview.suspend()
     if not _is_ours(scene):
         return
     if len(shot.holes(scene)) > 1:
@@ -78,6 +81,8 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if lens_sync.is_on(scene):
         _rendering.add(scene.name)
         _guarded(lens_render.begin, scene)
+        return
+    if world_sync.is_on(scene):
         return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
@@ -111,6 +116,7 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     """The frame is evaluated."""
     if _busy or depsgraph is None:
         return
+    preview.on_update(scene, depsgraph)
     if depsgraph.mode != "RENDER" and lens_sync.is_on(scene) and scene.name not in _rendering:
         lens_sync.show_live(scene, depsgraph)
     if depsgraph.mode != "RENDER" or scene.name not in _waiting:
@@ -120,7 +126,9 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
 
 @persistent
 def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Something has changed: the viewport's camera follows."""
+    """Something has changed: the viewport's camera and the preview follow."""
+    if not _busy and depsgraph is not None:
+        preview.on_update(scene, depsgraph)
     if depsgraph is None or _busy or scene.name in _rendering or not lens_sync.is_on(scene):
         return
     lens_sync.show_live(scene, depsgraph)
@@ -142,6 +150,7 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     """
     _restore_device(scene)
     baking.forget_shared_rays()
+    preview.resume()
     if scene.name in _rendering:
         _rendering.discard(scene.name)
         _waiting.discard(scene.name)
@@ -154,12 +163,16 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
 
 def _is_ours(scene: bpy.types.Scene) -> bool:
     """Whether rendering the scene shows its black hole."""
-    return lens_sync.is_on(scene) or is_in_use(scene)
+    return lens_sync.is_on(scene) or world_sync.is_on(scene) or is_in_use(scene)
 
 
 def _take_map_away(scene: bpy.types.Scene) -> None:
     if lens_sync.is_on(scene):
         lens_sync.break_camera(scene)
+        return
+    if world_sync.is_on(scene):
+        world_sync.check(scene)
+        world_sync.point_at_nothing(scene)
         return
     sync.point_at_nothing(scene)
     check_rendered(scene)
@@ -187,7 +200,13 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
         _waiting.discard(scene.name)
         return
     path = baking.path_of(scene, frame_shot)
-    baking.provide_map(scene, path, parameters, frame_shot.frame)
+    baking.provide_map(scene, path, baking.parameters_of(scene, frame_shot), frame_shot.frame)
+    if world_sync.is_on(scene):
+        world_sync.check_resolved(maps.WORLD_MAP.format.read_metadata(path), frame_shot)
+        world_sync.point_at_files(scene)
+        world_sync.forget_loaded_map(scene)
+        _waiting.discard(scene.name)
+        return
     _check_resolved(path, frame_shot)
     disk_sync.check_shot(scene, parameters)
     sync.point_at_maps(scene)
@@ -227,6 +246,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     _devices.clear()
     _rendering.clear()
     lens_render.forget()
+    preview.forget()
     for scene in bpy.data.scenes:
         if lens_sync.is_on(scene) and scene.library is None:
             lens_sync.show_live(scene)
@@ -234,13 +254,17 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
         if setup is not None and scene.library is None and setup.tree.library is None:
             sync.repair(scene)
             sync.refresh(scene)
+        if world_sync.is_on(scene) and scene.library is None:
+            world_sync.refresh(scene)
+    preview.start_again()
 
 
 @persistent
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
+    preview.drop_live()
     for scene in bpy.data.scenes:
-        if find_setup(scene) is None:
+        if find_setup(scene) is None and not world_sync.is_on(scene):
             continue
         sync.refresh(scene)
         try:
@@ -250,6 +274,19 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
             continue
         if folder is not None:
             sync.move_map_path(scene, folder)
+            world_sync.move_map_path(scene, folder)
+
+
+@persistent
+def on_save_post(_path: str = "", _unused: object = None) -> None:
+    """The file is saved: the preview shows itself again."""
+    preview.start_again()
+
+
+@persistent
+def on_undo_post(_scene: bpy.types.Scene, _unused: object = None) -> None:
+    """Undo or redo has replaced what the preview had shown."""
+    preview.start_again()
 
 
 # --- registration ---------------------------------------------------------------------------------
@@ -264,6 +301,9 @@ _HANDLERS = {
     "render_cancel": on_render_end,
     "load_post": on_load_post,
     "save_pre": on_save_pre,
+    "save_post": on_save_post,
+    "undo_post": on_undo_post,
+    "redo_post": on_undo_post,
 }
 
 

@@ -109,7 +109,7 @@ def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     The camera's own speed, which would take steps to other frames, is taken as none here.
     """
     if depsgraph is None:
-        depsgraph = _depsgraph_of(scene)
+        depsgraph = depsgraph_of(scene)
     try:
         check(scene)
         camera_of(scene)
@@ -118,7 +118,8 @@ def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
         break_camera(scene)
 
 
-def _depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """The dependency graph of the scene's view layer, up to date."""
     context = bpy.context
     layer = context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
     layer.update()

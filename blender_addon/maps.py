@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 
-from ._physics import disk_pass_file, exit_map_file, exr, map_check, map_file, physics, warp_map_file
+from ._physics import disk_pass_file, exit_map_file, exr, map_check, map_file, physics, warp_map_file, world_map_file
 from .errors import MapFolderError, SceneError
 
 SEQUENCE_LENGTH = 1_000_000
@@ -32,7 +32,7 @@ _TEMPORARY_FOLDER = "umbra_maps"
 
 @dataclass(frozen=True)
 class MapKind:
-    """What a file is read as: the map of the compositor, or that of the camera that bends its rays."""
+    """What a file is read as: the map of the compositor, of the camera that bends its rays, or of the World."""
 
     noun: str
     format: map_file.MapFormat
@@ -40,10 +40,13 @@ class MapKind:
 
 WARP_MAP = MapKind("warp map", warp_map_file.FORMAT)
 EXIT_MAP = MapKind("exit map", exit_map_file.FORMAT)
+WORLD_MAP = MapKind("world map", world_map_file.FORMAT)
 
 # The ending of copies that are being made while a file is saved for the first time.
 _PART = ".part"
 
+# What stands before a world map's frame.
+_WORLD_MARK = "world_"
 # What stands between an exit map's frame and the beginning of its hash.
 _EXIT_MARK = "_exit_"
 _HASH_CHARACTERS = 12
@@ -120,6 +123,18 @@ def exit_map_path(
     return folder(scene).path / (name.removesuffix(".exr") + hashed)
 
 
+def world_map_name(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:
+    """The file name of a frame's world map.
+
+    Raises
+    ------
+    SceneError
+        See `file_name`.
+    """
+    beginning, _, end = file_name(scene, hole_name, size, frame).rpartition("_")
+    return f"{beginning}_{_WORLD_MARK}{end}"
+
+
 def older_exit_maps(path: Path) -> list[Path]:
     """The exit maps of the same frame and size that were made from other parameters."""
     beginning = path.name[: path.name.rindex(_EXIT_MARK) + len(_EXIT_MARK)]
@@ -129,6 +144,8 @@ def older_exit_maps(path: Path) -> list[Path]:
 
 def kind_of(path: Path) -> MapKind:
     """What a file of the folder is read as, by its name."""
+    if re.search(rf"_{_WORLD_MARK}\d+\.exr$", path.name):
+        return WORLD_MAP
     return EXIT_MAP if _EXIT_MARK in path.name else WARP_MAP
 
 
@@ -180,7 +197,8 @@ def count_baked(
 ) -> int:
     """Number of the frames that have a map, up to date or not."""
     ending = rf"{_EXIT_MARK}[0-9a-f]+\.exr" if kind is EXIT_MAP else r"\.exr"
-    pattern = re.compile(re.escape(stem(scene, hole_name, size)) + r"(\d+)" + ending)
+    mark = _WORLD_MARK if kind is WORLD_MAP else ""
+    pattern = re.compile(re.escape(stem(scene, hole_name, size)) + mark + r"(\d+)" + ending)
     try:
         with os.scandir(folder(scene).path) as entries:
             matches = [pattern.fullmatch(entry.name) for entry in entries]

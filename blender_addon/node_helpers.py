@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing compositor nodes down as expressions, with the differences between Blender 4.5 and 5.x hidden here.
+"""Writing nodes down as expressions, with the differences between Blender 4.5 and 5.x hidden here.
 
 In 5.x most settings of compositor nodes became input sockets. Whatever depends on this is in this file; the
 code that builds the node group reads the same for both.
@@ -90,11 +90,22 @@ class TreeBuilder:
 
     def vector_math(self, operation: str, *values: Value, label: str = "") -> Socket:
         """Vector Math node with a vector as its result."""
+        return self._vector_node(operation, values, label).outputs["Vector"]
+
+    def _vector_node(self, operation: str, values: Sequence[Value], label: str) -> bpy.types.Node:
         node = self.node("ShaderNodeVectorMath", label)
         node.operation = operation
         for target, value in zip(node.inputs, values, strict=False):
             self.feed(target, value)
-        return node.outputs["Vector"]
+        return node
+
+    def dot(self, one: Value, other: Value, label: str = "") -> Socket:
+        """Dot product of two vectors."""
+        return self._vector_node("DOT_PRODUCT", (one, other), label).outputs["Value"]
+
+    def length(self, vector: Value, label: str = "") -> Socket:
+        """Length of a vector."""
+        return self._vector_node("LENGTH", (vector,), label).outputs["Value"]
 
     def vector_scale(self, vector: Value, factor: Value, label: str = "") -> Socket:
         """Vector times float."""

@@ -6,11 +6,11 @@ from functools import wraps
 
 import bpy
 
-from . import baking, compositing, environment, foreground, lens_sync, maps, output, shot, sync
+from . import baking, compositing, environment, foreground, lens_sync, maps, output, shot, sync, world_sync
 from ._physics import physics
 from .compositor_tree import find_setup
 from .errors import SceneError
-from .properties import COMPOSITOR, CYCLES_LENS, DEFAULT_MASS_SCALE, LARGEST_SPIN
+from .properties import COMPOSITOR, CYCLES_LENS, DEFAULT_MASS_SCALE, LARGEST_SPIN, WORLD
 
 TIMER_INTERVAL = 0.02  # seconds between steps of a bake that runs beside the interface
 
@@ -78,6 +78,8 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         settings.active_hole = hole
         if lens_sync.is_on(scene):
             lens_sync.show_live(scene)
+        if scene.umbra.output != COMPOSITOR:
+            world_sync.refresh(scene)
             return {"FINISHED"}
         stars = False
         if settings.environment_source == "WORLD":
@@ -124,7 +126,7 @@ class UMBRA_OT_make_active(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        context.scene.umbra.active_hole = context.object
+        context.scene.umbra.active_hole = context.object  # which refreshes the other outputs
         sync.refresh(context.scene)
         return {"FINISHED"}
 
@@ -140,8 +142,8 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if lens_sync.is_on(context.scene):
-            raise SceneError("This scene's output is the Cycles Lens: choose Output: Compositor first.")
+        if context.scene.umbra.output != COMPOSITOR:
+            raise SceneError("This scene's output is another one: choose Output: Compositor first.")
         _report_notes(self, compositing.set_up(context.scene))
         return {"FINISHED"}
 
@@ -184,7 +186,9 @@ class UMBRA_OT_set_output(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     output: bpy.props.EnumProperty(
-        name="Output", items=((COMPOSITOR, "Compositor", ""), (CYCLES_LENS, "Cycles Lens", "")), default=CYCLES_LENS
+        name="Output",
+        items=((COMPOSITOR, "Compositor", ""), (CYCLES_LENS, "Cycles Lens", ""), (WORLD, "World", "")),
+        default=CYCLES_LENS,
     )
 
     @reporting

@@ -1,15 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The switch between the two outputs: the compositor, and the camera that bends its rays."""
+"""The switch between the outputs: the compositor, the camera that bends its rays, and the World."""
 
 import bpy
 
-from . import compositing, foreground, lens_camera, lens_shader, lens_sync, messages
+from . import (
+    compositing,
+    foreground,
+    lens_camera,
+    lens_shader,
+    lens_sync,
+    messages,
+    preview,
+    world_output,
+    world_sync,
+)
 from ._physics import physics
 from .compositor_tree import find_setup
 from .errors import SceneError
-from .properties import COMPOSITOR, CYCLES_LENS
+from .properties import COMPOSITOR, CYCLES_LENS, WORLD
 
-# On the scene, while the lens is on: what to put back.
+# On the scene, while its output is another than the compositor: what to put back.
 BEFORE = "umbra_lens_before"
 
 # The scene's settings and the group's sockets that say the same.
@@ -18,6 +28,10 @@ SHARED = {
     "redshift_brightness": "Redshift Brightness",
     "sky_temperature": "Sky Temperature",
 }
+
+# What the image of a lensed World is placed by, and the sockets of the compositor's group that say the same.
+PLACEMENT = {"Rotation": "Environment Rotation", "Strength": "Environment Strength"}
+CARRIED = ("Exposure", *PLACEMENT.values())
 
 _switching = False
 
@@ -33,7 +47,7 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
     global _switching
     if scene.library is not None:
         raise SceneError(f'Scene "{scene.name}" is linked from another file: open that one.')
-    notes = _to_lens(scene) if wanted == CYCLES_LENS else _to_compositor(scene)
+    notes = {COMPOSITOR: _to_compositor, CYCLES_LENS: _to_lens, WORLD: _to_world}[wanted](scene)
     _switching = True
     try:
         scene.umbra.output = wanted
@@ -41,7 +55,17 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
         _switching = False
     if wanted == CYCLES_LENS:
         lens_sync.show_live(scene)
+    if wanted == WORLD:
+        world_sync.refresh(scene)
+    preview.on_output_switched(scene)
     return notes
+
+
+def present(scene: bpy.types.Scene) -> str:
+    """The output that the scene is set up for."""
+    if world_output.IS_BENT in scene:
+        return WORLD
+    return CYCLES_LENS if BEFORE in scene else COMPOSITOR
 
 
 def on_switched(scene: bpy.types.Scene) -> None:
@@ -58,7 +82,7 @@ def on_switched(scene: bpy.types.Scene) -> None:
         messages.popup(str(error))
         _switching = True
         try:
-            scene.umbra.output = COMPOSITOR if wanted == CYCLES_LENS else CYCLES_LENS
+            scene.umbra.output = present(scene)
         finally:
             _switching = False
 
@@ -69,6 +93,39 @@ def _to_lens(scene: bpy.types.Scene) -> list[str]:
     lens_shader.bytecode(uses_map=False)
     for camera in lens_camera.cameras_of(scene):
         lens_camera.convert(camera)
+    look = _leave_world(scene)
+    _leave_compositor(scene)
+    for name, socket in SHARED.items():
+        if socket in look:
+            setattr(scene.umbra, name, look[socket])
+    return []
+
+
+def _to_world(scene: bpy.types.Scene) -> list[str]:
+    node = world_output.install(scene)
+    foreground.remove(scene)
+    for camera in lens_camera.cameras_of(scene):
+        lens_camera.restore(camera)
+    _leave_compositor(scene)
+    look = scene[BEFORE].to_dict()["look"]
+    world_sync.set_inputs(node, look)
+    if PLACEMENT["Rotation"] in look:
+        world_output.place(scene, look[PLACEMENT["Rotation"]], look[PLACEMENT["Strength"]])
+    world_sync.set_inputs(node, {socket: getattr(scene.umbra, name) for name, socket in SHARED.items()})
+    return []
+
+
+def _leave_world(scene: bpy.types.Scene) -> dict[str, float]:
+    """Put the scene's World back; return the values that the artist has given the group."""
+    node = world_output.group_node(world_output.lensed_world(scene))
+    look = {} if node is None else world_sync.inputs_of(node)
+    look |= {PLACEMENT[name]: value for name, value in world_output.placement(scene).items()}
+    world_output.remove(scene)
+    return look
+
+
+def _leave_compositor(scene: bpy.types.Scene) -> None:
+    """Take the set-up out of the compositor, unless another output has done so before."""
     if BEFORE not in scene:
         setup = find_setup(scene)
         look = _look(setup.group) if setup is not None else {}
@@ -84,13 +141,16 @@ def _to_lens(scene: bpy.types.Scene) -> list[str]:
             "use_lock_interface": scene.render.use_lock_interface,
         }
         scene.render.use_lock_interface = True  # maps are baked by handlers while rendering
-    return []
 
 
 def _to_compositor(scene: bpy.types.Scene) -> list[str]:
     foreground.remove(scene)
     for camera in lens_camera.cameras_of(scene):
         lens_camera.restore(camera)
+    world_look = _leave_world(scene)
+    for name, socket in SHARED.items():
+        if socket in world_look:
+            setattr(scene.umbra, name, world_look[socket])
     if BEFORE not in scene:
         return []
     before = scene[BEFORE].to_dict()
@@ -101,6 +161,7 @@ def _to_compositor(scene: bpy.types.Scene) -> list[str]:
         setup = find_setup(scene)
         if setup is not None:
             look = before["look"] | {socket: getattr(scene.umbra, name) for name, socket in SHARED.items()}
+            look |= {name: world_look[name] for name in CARRIED if name in world_look}
             for name, value in look.items():
                 if name in setup.group.inputs and not setup.group.inputs[name].is_linked:
                     setup.group.inputs[name].default_value = value

@@ -5,7 +5,7 @@ import bpy
 
 from . import lens_sync, operators, shot, status
 from .compositor_tree import find_setup
-from .properties import CAMERA_ANIMATION
+from .properties import CAMERA_ANIMATION, COMPOSITOR
 
 LOOK_CONTROLS = ("Exposure", "Redshift Colour", "Redshift Brightness", "Sky Temperature")
 PLACEMENT_CONTROLS = ("Environment Rotation", "Environment Strength")
@@ -61,7 +61,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
         if hole is None:
             return
         lensed = lens_sync.is_on(scene)
-        if not lensed and find_setup(scene) is None:
+        if scene.umbra.output == COMPOSITOR and find_setup(scene) is None:
             layout.operator("umbra.setup_compositor", icon="NODE_COMPOSITING")
         if lensed and not lens_sync.uses_maps(scene):
             return

@@ -35,7 +35,7 @@ ACCURACIES = {
 }
 
 # What becomes of the hole: identifiers that are saved in files.
-COMPOSITOR, CYCLES_LENS = "COMPOSITOR", "CYCLES_LENS"
+COMPOSITOR, CYCLES_LENS, WORLD = "COMPOSITOR", "CYCLES_LENS", "WORLD"
 EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
 # Blender saves an enum's number, so a method keeps the one it has here.
@@ -158,6 +158,11 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
                 "Cycles Lens",
                 "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole",
             ),
+            (
+                WORLD,
+                "World",
+                "The World itself is bent: in the viewport too, in Cycles and EEVEE, with its light and reflections",
+            ),
         ),
         default=COMPOSITOR,
         update=lambda settings, _context: _output_changed(settings),
@@ -210,6 +215,13 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         max=1e6,
         step=10000,
         update=lambda settings, _context: _refresh(settings),
+    )
+    live_preview: bpy.props.BoolProperty(
+        name="Live Preview",
+        description="The viewport's sky and the thumbnail follow while you move the camera or the hole",
+        default=False,
+        update=lambda settings, _context: _preview_changed(settings),
+        options=set(),
     )
     foreground: bpy.props.PointerProperty(
         name="Foreground",
@@ -325,19 +337,27 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 def _refresh(settings: UmbraSceneProperties) -> None:
     """Carry a change into the compositor or the camera, where the set-up is in place."""
-    from . import lens_sync, sync  # they read these properties, hence not at the top
+    from . import lens_sync, sync, world_sync  # they read these properties, hence not at the top
 
     scene = settings.id_data
     if isinstance(scene, bpy.types.Scene) and sync.find_setup(scene) is not None:
         sync.refresh(scene)
     if isinstance(scene, bpy.types.Scene) and settings.output == CYCLES_LENS:
         lens_sync.show_live(scene)
+    if isinstance(scene, bpy.types.Scene) and settings.output == WORLD:
+        world_sync.refresh(scene)
 
 
 def _output_changed(settings: UmbraSceneProperties) -> None:
     from . import output  # it reads these properties, hence not at the top
 
     output.on_switched(settings.id_data)
+
+
+def _preview_changed(settings: UmbraSceneProperties) -> None:
+    from . import preview  # it reads these properties, hence not at the top
+
+    preview.on_switched(settings.id_data)
 
 
 def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from ._physics import physics
 from .disk_properties import disk_of
 from .errors import SceneError
 from .lens_camera import original_type
-from .properties import CAMERA_ANIMATION, CYCLES_LENS, MOTIONS, tolerances_of
+from .properties import CAMERA_ANIMATION, COMPOSITOR, MOTIONS, WORLD, tolerances_of
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -242,9 +242,9 @@ def _panorama_setting(camera: bpy.types.Camera, name: str) -> object:
 
 
 def camera_model(
-    camera: bpy.types.Camera, render: bpy.types.RenderSettings, engine: str
+    camera: bpy.types.Camera, render: bpy.types.RenderSettings, engine: str, *, world_output: bool = False
 ) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
-    """The physics' camera for a Blender camera's (evaluated) settings.
+    """The physics' camera for a Blender camera's (evaluated) settings; for the World output any stands for all.
 
     Raises
     ------
@@ -253,6 +253,8 @@ def camera_model(
     """
     width, height = render_size(render)
     kind_of_lens = original_type(camera)
+    if world_output and kind_of_lens != "ORTHO":
+        return physics.PanoramaCamera(width, height)  # the World is looked up by direction, whatever the lens
     if kind_of_lens == "PERSP":
         return physics.PerspectiveCamera(
             width,
@@ -324,7 +326,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     physics.BlackHoleError
         Whatever makes the frame impossible, as one sentence for the artist.
     """
-    check_render(scene.render, bends_rays=scene.umbra.output == CYCLES_LENS)
+    check_render(scene.render, bends_rays=scene.umbra.output != COMPOSITOR)
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
     camera = scene.camera
@@ -359,7 +361,9 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     position = world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m
     parameters = physics.WarpMapParameters(
         spin=float(hole_settings.spin),
-        camera=camera_model(evaluated_camera.data, scene.render, scene.render.engine),
+        camera=camera_model(
+            evaluated_camera.data, scene.render, scene.render.engine, world_output=settings.output == WORLD
+        ),
         camera_position=tuple(float(value) for value in position),
         camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
         hole_to_world=_rows(hole_pose.rotation),

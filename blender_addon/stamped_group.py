@@ -35,7 +35,7 @@ class SocketSpec:
 
 @dataclass(frozen=True)
 class StampedGroup:
-    """A kind of compositor node group, of which a file has one.
+    """A kind of node group, of which a file has one unless `ensure` is told which is meant.
 
     `is_current` and `ensure` look into the group itself, so that a change by hand is found as well.
     """
@@ -51,10 +51,12 @@ class StampedGroup:
     """Adds all nodes between the group's inputs and outputs, both by name."""
     former_names: dict[tuple[str, str], str] = field(default_factory=dict)
     """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
+    tree_type: str = TREE_TYPE
+    node_type: str = GROUP_NODE_TYPE
 
     def owns(self, tree: bpy.types.NodeTree | None) -> bool:
         """Whether a node tree is this group, of whatever version, whole or damaged."""
-        return tree is not None and tree.bl_idname == TREE_TYPE and self.version_key in tree
+        return tree is not None and tree.bl_idname == self.tree_type and self.version_key in tree
 
     def is_current(self, tree: bpy.types.NodeTree) -> bool:
         """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
@@ -69,8 +71,8 @@ class StampedGroup:
         groups = [tree for tree in bpy.data.node_groups if self.owns(tree) and tree.library is None]
         return next((tree for tree in groups if tree.name == self.name), groups[0] if groups else None)
 
-    def ensure(self) -> bpy.types.NodeTree:
-        """The group, whole and of this version.
+    def ensure(self, tree: bpy.types.NodeTree | None = None) -> bpy.types.NodeTree:
+        """The group, or the one that is given, whole and of this version.
 
         Returns
         -------
@@ -79,16 +81,16 @@ class StampedGroup:
             changes inside is rebuilt in place: group nodes that use it keep their values and links, as far as
             their sockets still exist.
         """
-        tree = self.find()
+        tree = tree or self.find()
         if tree is None:
-            tree = bpy.data.node_groups.new(self.name, TREE_TYPE)
+            tree = bpy.data.node_groups.new(self.name, self.tree_type)
         if not self.is_current(tree):
             self._rebuild(tree)
         return tree
 
     def add_node(self, tree: bpy.types.NodeTree) -> bpy.types.Node:
-        """Add a group node that uses the group to a compositor tree; `inputs` and `outputs` name its sockets."""
-        node = tree.nodes.new(GROUP_NODE_TYPE)
+        """Add a group node that uses the group to a tree; `inputs` and `outputs` name its sockets."""
+        node = tree.nodes.new(self.node_type)
         node.node_tree = self.ensure()
         node.name = node.label = self.name
         node.width = 220.0
@@ -144,12 +146,12 @@ def _blender_series() -> str:
 
 def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
     """Give a new input its default in existing group nodes, where Blender made it before it had one."""
-    users = list(bpy.data.node_groups)
+    users = [*bpy.data.node_groups, *(world.node_tree for world in bpy.data.worlds if world.node_tree is not None)]
     if not SETTINGS_ARE_SOCKETS:
         users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
     for user in users:
         for node in user.nodes:
-            if node.bl_idname == GROUP_NODE_TYPE and node.node_tree == tree:
+            if getattr(node, "node_tree", None) == tree:
                 node.inputs[spec.name].default_value = spec.default
 
 

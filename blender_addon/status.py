@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import baking, environment, lens_objects, lens_shader, lens_sync, maps, shot
+from . import baking, environment, lens_objects, lens_shader, lens_sync, maps, shot, world_sync
 from ._physics import metric, physics
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION
@@ -75,6 +75,8 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     found: list[Line] = []
     if lensed:
         found += _lens_lines(scene, depsgraph, now)
+    elif world_sync.is_on(scene):
+        found += _world_lines(scene)
     elif find_setup(scene) is None:
         found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
     if not lensed or lens_sync.uses_maps(scene):
@@ -95,6 +97,17 @@ def _lens_lines(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, now: sho
         found += wrapped(warning, "INFO")
     if shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
         found += wrapped("The viewport shows the lens without the camera's speed; a render has it.", "INFO")
+    return found
+
+
+def _world_lines(scene: bpy.types.Scene) -> list[Line]:
+    found: list[Line] = []
+    try:
+        world_sync.check(scene)
+    except physics.BlackHoleError as error:
+        found += wrapped(str(error), "ERROR")
+    if scene.render.film_transparent:
+        found += wrapped("Film > Transparent is on: the camera does not see the World.", "ERROR")
     return found
 
 

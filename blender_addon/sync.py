@@ -51,12 +51,23 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
             notes.append(str(error))
 
 
-def _map_image(name: str) -> bpy.types.Image:
+# Together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see maps.py.
+SEQUENCE_SETTINGS = {
+    "frame_duration": maps.SEQUENCE_LENGTH,
+    "frame_start": 0,
+    "frame_offset": -1,
+    "use_cyclic": True,
+    "use_auto_refresh": True,
+}
+
+
+def map_image(name: str) -> bpy.types.Image:
+    """An image datablock that reads maps, as yet none."""
     image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP
     image.colorspace_settings.name = "Non-Color"
-    image.alpha_mode = "CHANNEL_PACKED"  # alpha is the visibility, not a mask of the other channels
+    image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
     return image
 
 
@@ -104,16 +115,8 @@ def point_passes(setup: Setup, path: str) -> None:
 def _read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
     """Let an image node read one file for each frame."""
     if node.image is None or node.image.source != "SEQUENCE":
-        node.image = _map_image(name)
-    wanted = {
-        # together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see maps.py
-        "frame_duration": maps.SEQUENCE_LENGTH,
-        "frame_start": 0,
-        "frame_offset": -1,
-        "use_cyclic": True,
-        "use_auto_refresh": True,
-    }
-    for name, value in wanted.items():
+        node.image = map_image(name)
+    for name, value in SEQUENCE_SETTINGS.items():
         if getattr(node, name) != value:
             setattr(node, name, value)
     if node.image.filepath != path:

@@ -178,6 +178,10 @@ class Claims:
         _own.add(target)
         return True
 
+    def owns(self, target: Path) -> bool:
+        """Whether a file was claimed by this very piece of work, and not by another one of the same process."""
+        return self._held.get(target) is not None
+
     def is_taken(self, target: Path, *, watch: bool = True) -> bool:
         """Whether a process that seems to be alive has claimed a file; nothing is claimed by asking."""
         if target in _own:
@@ -272,7 +276,7 @@ def _make(path: Path, content: bytes) -> None:
         try:
             os.link(draft, path)
         except FileExistsError:
-            if draft.stat().st_nlink != 2:  # the server did it, and its answer was lost
+            if not draft.exists() or draft.stat().st_nlink != 2:  # 2: the server did it, and its answer was lost
                 raise
         except OSError:  # a file system without links: two steps, and whoever comes between finds no name yet
             with path.open("xb") as stream:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from . import disk_pass_file, exit_map_file, warp_map_file
+from . import disk_pass_file, exit_map_file, warp_map_file, world_map_file
 from .errors import ImageFileError, WarpMapError
 from .exr import PathLike, read_exr_header
 from .exr_header import MAGIC
@@ -18,6 +18,7 @@ from .map_file import ATTRIBUTE_FORMAT, MapFormat
 READERS: dict[MapFormat, Callable[[PathLike], object]] = {
     warp_map_file.FORMAT: warp_map_file.read_warp_map,
     exit_map_file.FORMAT: exit_map_file.read_exit_map,
+    world_map_file.FORMAT: world_map_file.read_world_map,
     disk_pass_file.FORMAT: disk_pass_file.read_disk_pass,
 }
 

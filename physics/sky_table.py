@@ -68,7 +68,7 @@ def sky_table_steps(parameters: WarpMapParameters) -> Generator[float, None, Sky
     closest = CLOSEST * float(edge.max())
     first = math.log(closest) + closest
     count = math.ceil((math.log(math.pi) + math.pi - first) / STEP) + len(ALONG)
-    delta = _distances(first + STEP * (np.arange(count) + ALONG[0]))
+    delta = distances(first + STEP * (np.arange(count) + ALONG[0]))
     # Beyond the opposite point, where delta + edge passes pi, the same formula goes on down the other side.
     looking = around_hole(edge[:, None] + delta, aside[:, None], up[:, None]).reshape(-1, 3)
     directions = np.empty((3, len(looking)))
@@ -145,7 +145,7 @@ def _place(parameters: WarpMapParameters) -> Place:
     )
 
 
-def _distances(s: NDArray[np.floating[Any]]) -> Array:
+def distances(s: NDArray[np.floating[Any]]) -> Array:
     """Return delta with ln(delta) + delta = s, by Newton's method in ln(delta), which comes down from above."""
     logarithm: Array = s.astype(np.float64)
     for _ in range(NEWTON_ROUNDS):

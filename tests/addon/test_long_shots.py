@@ -200,6 +200,22 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
     assert np.isfinite(read(tmp_path / "picture.exr", modules.exr)).all()
 
 
+def test_a_render_that_waits_can_be_stopped(
+    blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    path, _parameters = addon_module("baking").map_at(bpy.context.scene, 1)
+    claim_elsewhere(path, addon_module("_physics").claim)
+    render = f"bpy.ops.wm.open_mainfile(filepath={blend!r}); bpy.ops.render.render(animation=True)"
+    with start_python(render) as process:
+        for line in process.stdout:
+            if "waiting for the warp map of frame 1" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 1
+        assert "Frame 1: Stopped while waiting for the warp map of frame 1, which farm-7" in process.stderr.read()
+    assert not list(tmp_path.glob("picture_*"))
+
+
 def test_a_bake_does_other_frames_first_and_then_waits(
     blend: str, addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,6 +54,7 @@ print(json.dumps(noted))
 RENDER = """
 bpy.app.handlers.render_write.append(lambda *_: note())
 bpy.ops.render.render(animation=True)
+bpy.app.handlers.render_write.clear()  # Blender 4.5 hangs at the end with a handler of a script still there
 print(json.dumps(noted))
 """
 

@@ -92,6 +92,8 @@ def test_work_of_the_same_process_does_not_wait_for_itself(target: Path) -> None
         assert bake.take(target)
         with Claims() as render:
             assert render.take(target)
+            assert not render.owns(target)
+        assert bake.owns(target)
         assert claim_path(target).exists()
 
 

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which map a lensed World reads: the files of the frames, none at all, or the one that the preview keeps."""
+
+import bpy
+import numpy as np
+
+from . import maps, messages, shot, sync, world_group, world_output
+from ._physics import physics, world_map
+from .errors import SceneError
+from .properties import WORLD
+from .world_nodes import map_nodes
+
+FILE_IMAGE_NAME, LIVE_IMAGE_NAME = "Umbra World Map", "Umbra Live Map"
+
+
+def is_on(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's output is its World."""
+    return scene.umbra.output == WORLD
+
+
+def refresh(scene: bpy.types.Scene) -> None:
+    """Carry the scene's settings into its lensed World: another sky, another folder of maps."""
+    world = world_output.lensed_world(scene)
+    shows_image = scene.umbra.environment_source == "IMAGE"
+    if world is not None and scene.get(world_output.IS_BENT) and _is_stale(scene, world, shows_image=shows_image):
+        values = inputs_of(world_output.group_node(world))
+        before = scene.get(world_output.BEFORE)
+        try:
+            world_output.remove(scene)
+            set_inputs(world_output.install(scene), values)
+        except SceneError as error:
+            messages.warn(str(error))
+            scene.world = before
+            return
+    if not shows_live(scene):
+        point_at_files(scene)
+
+
+def _is_stale(scene: bpy.types.Scene, world: bpy.types.World, *, shows_image: bool) -> bool:
+    """Whether the World was made for another sky than the one that is chosen."""
+    made_of_image = world.get(world_output.LENSED) == world_output.OF_IMAGE
+    if made_of_image != shows_image:
+        return True
+    if not shows_image:
+        return False
+    texture = next((node for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT"), None)
+    return texture is not None and texture.image != scene.umbra.environment_image
+
+
+def inputs_of(node: bpy.types.Node) -> dict[str, float]:
+    """The values of a group node's inputs that are not linked."""
+    return {socket.name: socket.default_value for socket in node.inputs if not socket.is_linked}
+
+
+def set_inputs(node: bpy.types.Node, values: dict[str, object]) -> None:
+    """Give a group node those values that it has inputs for."""
+    for name, value in values.items():
+        socket = node.inputs.get(name)
+        if socket is not None and not socket.is_linked and isinstance(value, float):
+            socket.default_value = value
+
+
+# --- which map is read ----------------------------------------------------------------------------
+
+
+def _group(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
+    """The group in the scene's lensed World, whole, and its own: a copy of the World shares it at first."""
+    node = world_output.group_node(world_output.lensed_world(scene))
+    if node is None:
+        return None
+    if node.node_tree.library is None:
+        if node.node_tree.users > 1:
+            node.node_tree = node.node_tree.copy()
+        world_group.mend(node.node_tree)
+    return node.node_tree
+
+
+def _point(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
+    group = _group(scene)
+    if group is None:
+        return
+    for node in map_nodes(group):
+        if node.image != image:
+            node.image = image
+        if image.source == "SEQUENCE":
+            for name, value in sync.SEQUENCE_SETTINGS.items():
+                if getattr(node.image_user, name) != value:
+                    setattr(node.image_user, name, value)
+
+
+def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
+    """An image that a World remembers; not one that it shares with the World it is a copy of."""
+    image = world.get(key)
+    shared = any(each != world and each.get(key) == image for each in bpy.data.worlds)
+    return None if shared else image
+
+
+def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
+    """The image that reads the scene's maps: the one in use, or another."""
+    world = world_output.lensed_world(scene)
+    present = _own(world, world_output.FILE_IMAGE)
+    if present is None:
+        present = sync.map_image(FILE_IMAGE_NAME)
+        present.use_half_precision = False
+        world[world_output.FILE_IMAGE] = present
+    return present
+
+
+def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
+    if world_output.lensed_world(scene) is None:
+        return
+    image = _file_image(scene)
+    if image.filepath != path:
+        image.filepath = path
+    _point(scene, image)
+
+
+def point_at_files(scene: bpy.types.Scene) -> None:
+    """Let the World read the map of each frame from its file; no map where there is no hole."""
+    hole = shot.find_active_hole(scene)
+    if hole is None:
+        point_at_nothing(scene)
+        return
+    columns, rows = world_map.FINAL
+    name = maps.world_map_name(scene, hole.name, (columns, rows + 1), 1)
+    _point_at_path(scene, maps.folder(scene).blender_path + name)
+
+
+def point_at_nothing(scene: bpy.types.Scene) -> None:
+    """Let the World read no map: it is magenta."""
+    _point_at_path(scene, maps.folder(scene).blender_path + sync.NO_MAP)
+
+
+def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
+    """Let the World read the same files from another folder."""
+    if world_output.lensed_world(scene) is not None:
+        name = bpy.path.basename(_file_image(scene).filepath)
+        _point_at_path(scene, blender_folder + name)
+
+
+def forget_loaded_map(scene: bpy.types.Scene) -> None:
+    """Let Blender read the maps anew from their files."""
+    if world_output.lensed_world(scene) is not None:
+        _file_image(scene).reload()
+
+
+# --- the preview's map ----------------------------------------------------------------------------
+
+
+def shows_live(scene: bpy.types.Scene) -> bool:
+    """Whether the World reads the preview's map."""
+    return _shown_live(scene) is not None
+
+
+def live_images(world: bpy.types.World) -> list[bpy.types.Image]:
+    """The images that the preview's map is kept in."""
+    return [world[key] for key in world_output.LIVE_IMAGES if world.get(key) is not None]
+
+
+def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    """The image of the preview's map that the World reads now."""
+    world = world_output.lensed_world(scene)
+    if world is None:
+        return None
+    read = {each.image for each in map_nodes(world_output.group_node(world).node_tree)}
+    image = read.pop() if len(read) == 1 else None
+    return image if image in live_images(world) else None
+
+
+def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
+    """Let the World read a map that is in memory; always through the same image, or through two in turn."""
+    world = world_output.lensed_world(scene)
+    if world is None:
+        return
+    shown = _shown_live(scene)
+    key = _next_key(scene, world, shown)
+    image = _own(world, key)
+    rows, columns = made.texture.shape[:2]
+    if image is None or tuple(image.size) != (columns, rows):
+        image = bpy.data.images.new(LIVE_IMAGE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
+        image.alpha_mode = "CHANNEL_PACKED"
+        image.use_half_precision = False
+        world[key] = image
+    image.pixels.foreach_set(np.ravel(made.texture))
+    image.update()
+    tree = world_output.group_node(world).node_tree
+    if shown is None or tree.users > 1:
+        _point(scene, image)
+    elif shown != image:  # looking after the group, too, would take longer than the map
+        for node in map_nodes(tree):
+            node.image = image
+
+
+def _next_key(scene: bpy.types.Scene, world: bpy.types.World, shown: bpy.types.Image | None) -> str:
+    """Under which key the next map goes: Cycles keeps the pixels of an image for as long as a shader reads it."""
+    first, second = world_output.LIVE_IMAGES
+    return second if needs_turns(scene) and shown is not None and shown == world.get(first) else first
+
+
+def needs_turns(scene: bpy.types.Scene) -> bool:
+    """Whether a map that has changed must come as another image to be seen."""
+    return scene.render.engine == "CYCLES"
+
+
+def show_again(scene: bpy.types.Scene) -> None:
+    """Let Cycles see the map once more: of two changes between two of its looks it has seen neither."""
+    shown = _shown_live(scene)
+    if shown is None:
+        return
+    rows, columns = shown.size[1], shown.size[0]
+    texture = np.empty(rows * columns * 4, np.float32)
+    shown.pixels.foreach_get(texture)
+    show_live(scene, world_map.WorldMap(texture.reshape(rows, columns, 4), {}))
+
+
+def drop_live(scene: bpy.types.Scene) -> None:
+    """Let the World read its files again, and free the preview's map."""
+    world = world_output.lensed_world(scene)
+    if world is None:
+        return
+    point_at_files(scene)
+    images = live_images(world)
+    for key in world_output.LIVE_IMAGES:
+        if key in world:
+            del world[key]
+    for image in images:
+        if image.users == 0:
+            bpy.data.images.remove(image)
+
+
+# --- rendering ------------------------------------------------------------------------------------
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Refuse a scene whose World is not the lensed one any more.
+
+    Raises
+    ------
+    SceneError
+        Another World was chosen.
+    """
+    if world_output.lensed_world(scene) is None:
+        raise SceneError(
+            f'Scene "{scene.name}" has the output World, but another World was chosen since: set Output: World again.'
+        )
+
+
+def check_resolved(metadata: dict, frame_shot: shot.Shot) -> None:
+    """Refuse a map with rays that its method could not resolve.
+
+    Raises
+    ------
+    SceneError
+        There are some.
+    """
+    unresolved = metadata["counts"]["unresolved"]
+    if unresolved:
+        label = physics.METHODS[frame_shot.parameters.method].label
+        raise SceneError(
+            f"Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "
+            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
+        )
