@@ -21,7 +21,7 @@ BAKED = 0.25
 """Share of an animation's frames that are baked when the picture of it is taken."""
 PERCENTAGE = 40
 """Of the renders' full HD."""
-WIDER = 90
+WIDER = 170
 """Pixels that the sidebar is drawn wider, so that its words fit."""
 BORDER = 4
 TABS = 26
