@@ -17,9 +17,8 @@ from typing import TypeVar
 
 import bpy
 
-from . import lens_sync, maps, shot, stopping, sync, world_sync
+from . import lens_disk, lens_sync, maps, shot, stopping, sync, world_sync
 from ._physics import claim, exit_map, exit_map_file, physics, world_map, world_map_file
-from .compositor_tree import find_setup
 from .errors import SceneError
 
 Baked = physics.WarpMap | exit_map.ExitMap | world_map.WorldMap
@@ -189,6 +188,16 @@ def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.War
     return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
 
 
+def maps_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "list[tuple[Path, physics.WarpMapParameters]]":
+    """All that a shot needs baked: where it lies, and what it is made from."""
+    needed = []
+    if not lens_sync.is_on(scene) or lens_sync.uses_maps(scene):
+        needed.append((path_of(scene, frame_shot), parameters_of(scene, frame_shot)))
+    if lens_sync.is_on(scene) and frame_shot.parameters.disk is not None and lens_disk.is_in_use(scene):
+        needed.append((lens_disk.path_of(scene, frame_shot), lens_disk.parameters_of(scene, frame_shot)))
+    return needed
+
+
 def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     """Where the map of a shot lies, or will lie."""
     if lens_sync.is_on(scene):
@@ -206,6 +215,14 @@ def map_at(
     layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
     frame_shot = shot.read_at(scene, frame, layer)
     return path_of(scene, frame_shot), parameters_of(scene, frame_shot)
+
+
+def maps_at(
+    scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None
+) -> "list[tuple[Path, physics.WarpMapParameters]]":
+    """All that any frame needs baked, as `maps_of` says."""
+    layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+    return maps_of(scene, shot.read_at(scene, frame, layer))
 
 
 def bake_frames(
@@ -267,7 +284,8 @@ class _Work:
         self._fraction = 0.0
         self._claims, self._writing = claims, writing
         self._half_files: dict[str, list[Path]] | None = None
-        self._being_written: tuple[int, Path] | None = None
+        self._being_written: tuple[int, Path, bool] | None = None
+        """Frame, path, and whether it is the frame's last map."""
         self._refused: Path | None = None
         """The last map that another process had claimed."""
 
@@ -276,24 +294,29 @@ class _Work:
         scene = bpy.data.scenes.get(self._scene_name)
         if scene is None:
             raise SceneError(f'Scene "{self._scene_name}" is gone: baking has stopped.')
-        path, parameters = map_at(scene, frame, self._view_layer_name)
+        needed = maps_at(scene, frame, self._view_layer_name)
         self.summary.folder = maps.folder(scene)
         yield self._progress(frame)
-        if not maps.is_fresh(path, parameters):
+        stale = [each for each in needed if not maps.is_fresh(*each)]
+        made = False
+        for path, parameters in stale:
             prepare(path, parameters)
             if self._half_files is None:
                 self._half_files = maps.half_files(path.parent)
             if not take(self._claims, path, parameters, self._half_files):
                 self._refused = path
                 return False
-            if not maps.is_fresh(path, parameters):  # nobody else has made it in the meantime
-                baked = yield from self._trace(frame, path, parameters)
-                yield from self.finish_writing()
-                self._writing.start(functools.partial(_write, path, baked, frame, self._count))
-                self._being_written = frame, path
-                self.summary.baked.append(frame)
-                return True
-            self._claims.release(path)
+            if maps.is_fresh(path, parameters):  # somebody else has made it in the meantime
+                self._claims.release(path)
+                continue
+            baked = yield from self._trace(frame, path, parameters)
+            yield from self.finish_writing()
+            self._writing.start(functools.partial(_write, path, baked, frame, self._count))
+            self._being_written = frame, path, path == stale[-1][0]
+            made = True
+        if made:
+            self.summary.baked.append(frame)
+            return True
         self.summary.reused.append(frame)
         yield self._progress(frame, outcome=KEPT)
         return True
@@ -315,13 +338,14 @@ class _Work:
         """Wait for the map that is being written, and give its claim back."""
         if self._being_written is None:
             return
-        frame, path = self._being_written
+        frame, path, is_last = self._being_written
         while not self._writing.wait(WAIT):
             self._claims.beat()
             yield self._progress(frame, doing=": writing")
         self._being_written = None
         self._claims.release(path)
-        yield self._progress(frame, outcome=BAKED)
+        if is_last:
+            yield self._progress(frame, outcome=BAKED)
 
     def wait_for(self, frame: int) -> Generator[Progress, None, None]:
         """Let some time pass: only frames are left that other processes are baking."""
@@ -385,8 +409,11 @@ def finish(scene_name: str) -> None:
     """Let the compositor see new maps."""
     forget_shared_rays()
     scene = bpy.data.scenes.get(scene_name)
-    if scene is not None and find_setup(scene) is not None:
-        sync.refresh(scene)
+    if scene is not None:
+        if lens_sync.is_on(scene):
+            lens_disk.point_at_passes(scene)
+        else:
+            sync.refresh(scene)
         sync.forget_loaded_map(scene)
     if scene is not None and world_sync.is_on(scene):
         world_sync.forget_loaded_map(scene)

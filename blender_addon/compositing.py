@@ -49,7 +49,7 @@ def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     return outputs[0] if outputs else None
 
 
-def _background_layer(
+def background_layer(
     socket: bpy.types.NodeSocket, layers: list[bpy.types.Node], seen: set[str]
 ) -> bpy.types.Node | None:
     """The render layer that lies farthest back in what feeds a socket: the one the sky belongs behind."""
@@ -69,7 +69,7 @@ def _background_layer(
         else:
             inputs.sort(key=lambda each: each.type != "RGBA")
         for each in inputs:
-            found = _background_layer(each, layers, seen)
+            found = background_layer(each, layers, seen)
             if found is not None:
                 return found
     return None
@@ -111,11 +111,12 @@ def make_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
         output = tree.nodes.new("NodeGroupOutput")
     output[ROLE] = OUTPUT
     output.location = (500, 0)
-    _add_render_layer(tree, scene)
+    add_render_layer(tree, scene)
     return tree
 
 
-def _add_render_layer(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> bpy.types.Node:
+def add_render_layer(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> bpy.types.Node:
+    """A Render Layers node of the scene."""
     layer = tree.nodes.new("CompositorNodeRLayers")
     layer.scene = scene
     layer[ROLE] = RENDER_LAYER
@@ -123,7 +124,14 @@ def _add_render_layer(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> bpy.t
     return layer
 
 
-def _check_shared(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
+def check_shared(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
+    """Refuse a tree that is not the scene's alone.
+
+    Raises
+    ------
+    SceneError
+        It belongs to another file or scene.
+    """
     if has_scene_tree():
         return
     if tree.library is not None:
@@ -152,7 +160,7 @@ def set_up(scene: bpy.types.Scene) -> list[str]:
     notes: list[str] = []
     tree = find_tree(scene)
     if tree is not None:
-        _check_shared(scene, tree)
+        check_shared(scene, tree)
     if has_scene_tree() and tree is not None and not scene.use_nodes and BEFORE not in scene:
         notes.append("Use Nodes was off: it has been switched on, with the nodes that were there.")
     _remember(scene, tree_is_new=tree is None)
@@ -190,9 +198,9 @@ def _insert(scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.N
     if not group.inputs["Render"].is_linked:
         output = output_node(tree)
         layers = render_layers(tree, scene)
-        layer = _background_layer(output.inputs[0], layers, set()) if output is not None else None
+        layer = background_layer(output.inputs[0], layers, set()) if output is not None else None
         if layer is None:
-            layer = layers[0] if layers else _add_render_layer(tree, scene)
+            layer = layers[0] if layers else add_render_layer(tree, scene)
         if len(layers) > 1:
             notes.append(f'The sky was put behind render layer "{layer.layer}", the one farthest back.')
         picture = layer.outputs["Image"]
@@ -274,9 +282,9 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     """Give the render's picture back to whatever the group's feeds, and remove our nodes."""
     setup = find_setup(scene)
     if setup is not None:
-        disk_sync.remove(setup)
+        disk_sync.remove(tree)
     for group in find_nodes(tree, GROUP):
-        _give_back(tree, group)
+        give_back(tree, group, "Render")
         prefix = group.path_from_id() + "."
         if tree.animation_data is not None:
             for curve in [each for each in tree.animation_data.drivers if each.data_path.startswith(prefix)]:
@@ -297,9 +305,9 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
         tree.nodes.remove(layer)
 
 
-def _give_back(tree: bpy.types.NodeTree, group: bpy.types.Node) -> None:
-    """Link what the group feeds to the render layer, except what was not linked at all before."""
-    into, out = group.inputs.get("Render"), group.outputs.get("Image")
+def give_back(tree: bpy.types.NodeTree, group: bpy.types.Node, behind: str) -> None:
+    """Link what a group feeds to the render layer at its input `behind`, except what was not linked at all before."""
+    into, out = group.inputs.get(behind), group.outputs.get("Image")
     if into is None or out is None or not into.is_linked:
         return
     picture = into.links[0].from_socket

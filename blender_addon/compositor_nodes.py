@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 from ._physics import colour, reference_render
 from .node_helpers import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder, Value
@@ -92,7 +91,9 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
     with builder.frame("Environment"):
         environment = sample_bilinearly(builder, inputs.environment, u, v)
     with builder.frame("Redshift"):
-        gain = redshift_gain(builder, channels.one_plus_z, inputs)
+        gain = redshift_gain(
+            builder, channels.one_plus_z, inputs.redshift_colour, inputs.redshift_brightness, inputs.temperature
+        )
     with builder.frame("Sky"):
         factor = builder.math("MULTIPLY", builder.math("POWER", 2.0, inputs.exposure), inputs.strength)
         factor = builder.math("MULTIPLY", factor, channels.visibility)
@@ -219,24 +220,27 @@ def sample_bilinearly(builder: TreeBuilder, environment: Value, u: Value, v: Val
     return builder.select_vector(share_y, *mixed)
 
 
-class RedshiftInputs(Protocol):
-    """The sockets that say how light is shifted."""
+def sample_with_alpha(builder: TreeBuilder, picture: Value, u: Value, v: Value) -> tuple[Socket, Socket]:
+    """The same look-up of a picture's colour as a vector, and of its alpha."""
+    if SETTINGS_ARE_SOCKETS:
+        colour = sample_bilinearly(builder, picture, u, v)
+        return colour, builder.separate_colour(colour)[3]
+    _, _, _, alpha = builder.separate_colour(picture)
+    alphas = sample_bilinearly(builder, builder.combine(alpha, alpha, alpha), u, v)
+    return sample_bilinearly(builder, picture, u, v), builder.separate(alphas)[0]
 
-    redshift_colour: Socket
-    redshift_brightness: Socket
-    temperature: Socket
 
-
-def redshift_gain(builder: TreeBuilder, one_plus_z: Socket, inputs: RedshiftInputs) -> Socket:
+def redshift_gain(
+    builder: TreeBuilder, one_plus_z: Socket, amount: Value, brightness_amount: Value, temperature: Value
+) -> Socket:
     """Vector of the gains of red, green and blue; see `physics.colour` for the formula and where it is from.
 
     exp(4 (c - k) ln(1+z) + c (x - y + ln(1 - exp(-x)) - ln(1 - exp(-y)))), y = (1 + z) x: by logarithms, so
     that nothing overflows on the way.
     """
-    amount = inputs.redshift_colour
-    excess = builder.math("SUBTRACT", amount, inputs.redshift_brightness)
+    excess = builder.math("SUBTRACT", amount, brightness_amount)
     power = builder.math("MULTIPLY", builder.math("MULTIPLY", 4.0, excess), _natural_log(builder, one_plus_z))
-    temperature = builder.math("MAXIMUM", 1.0, inputs.temperature)
+    temperature = builder.math("MAXIMUM", 1.0, temperature)
     gains = []
     for wavelength in colour.CHANNEL_WAVELENGTHS:
         x = builder.math("DIVIDE", colour.SECOND_RADIATION_CONSTANT / wavelength, temperature)

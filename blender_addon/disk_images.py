@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disk's small pictures, made by numpy and packed into the file: two tables, and the streaks.
+"""The disk's small pictures, made by numpy and packed into the file: a table of colours, and the streaks.
 
-Tables are a column of pixels, their first value at the top.
+The table is a column of pixels, its first value at the top.
 """
 
 import tempfile
@@ -12,38 +12,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ._physics import disk_flux, disk_look, disk_texture, exr
+from ._physics import disk_look, disk_texture, exr
 
-PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME = "Umbra Disk Profile", "Umbra Disk Colours", "Umbra Disk Streaks"
+COLOURS_NAME, TEXTURE_NAME = "Umbra Disk Colours", "Umbra Disk Streaks"
 
-# Enough that values between rows are off by less than 1e-5 of the largest.
-PROFILE_ROWS = 2048
 COLOUR_ROWS = disk_look.COLOURS  # those of numpy itself, between which it interpolates too
+
+# Pictures are scaled down to this before their means are taken.
+MEANS_SIZE = 512
+
+# A table that files had whose node group was of version 1.
+FORMER_PROFILE_NAME = "Umbra Disk Profile"
 
 # Values are rounded to these steps, far finer than anything to be seen: the file stays small.
 TEXTURE_STEPS = 256
 
 # What a picture was made from, on the picture itself.
 _MADE_FROM = "umbra_made_from"
-
-
-def profile(name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool) -> NDArray:
-    """Flux relative to its largest at radii evenly spaced in ln(r) from the inner to the outer edge."""
-    radii = np.geomspace(inner, outer, PROFILE_ROWS)
-    return disk_flux.relative_flux(name, spin, radii, inner, exponent, retrograde)
-
-
-def ensure_profile(
-    hole_name: str, name: str, exponent: float, spin: float, inner: float, outer: float, retrograde: bool
-) -> bpy.types.Image:
-    """The table of the profile of a hole's disk, as an image; each hole has one of its own."""
-    wanted = repr((name, exponent, spin, inner, outer, retrograde))
-
-    def pixels() -> NDArray:
-        flux = profile(name, exponent, spin, inner, outer, retrograde)
-        return np.repeat(flux[:, None, None], 3, axis=2)
-
-    return _ensure(f"{PROFILE_NAME} ({hole_name})", wanted, pixels)
 
 
 def ensure_colours() -> bpy.types.Image:
@@ -102,8 +87,31 @@ def _ensure(name: str, made_from: str, pixels: Callable[[], NDArray]) -> bpy.typ
     return image
 
 
+def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
+    """Means of an image's rows, from the top, premultiplied and scene-linear, shape (rows, 4); None without pixels."""
+    if min(image.size) <= 0:
+        return None
+    small = image.copy()
+    try:
+        small.scale(*(min(each, MEANS_SIZE) for each in image.size))
+        pixels = np.empty(len(small.pixels), np.float32)
+        small.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(small.size[1], small.size[0], -1)[::-1]
+        if pixels.shape[2] == 3:
+            pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
+        if not image.is_float:  # as it lies in the file
+            if image.colorspace_settings.name == "sRGB":
+                colour = pixels[..., :3]
+                linear = ((colour + 0.055) / 1.055) ** 2.4
+                pixels[..., :3] = np.where(colour <= 0.04045, colour / 12.92, linear)
+            pixels[..., :3] *= pixels[..., 3:]
+        return pixels.mean(axis=1).astype(np.float64)
+    finally:
+        bpy.data.images.remove(small)
+
+
 def remove_unused() -> None:
     """Remove those of the pictures that nothing uses any more."""
     for image in list(bpy.data.images):
-        if image.name.startswith((PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME)) and image.users == 0:
+        if image.name.startswith((FORMER_PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME)) and image.users == 0:
             bpy.data.images.remove(image)

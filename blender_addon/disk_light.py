@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import disk_properties
+from . import disk_animation, disk_images, disk_properties
 from ._physics import disk_look, physics
 
 NAME = "Umbra Disk Light"
@@ -40,8 +40,9 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
         if light is not None:
             _remove(light)
         return
-    disk, look = disk_properties.disk_of(settings), disk_properties.look_of(settings)
-    spin = float(hole.umbra.spin)
+    frame = scene.frame_current
+    spin, disk = disk_animation.disk_at(hole, frame)
+    look = disk_animation.look_at(hole, frame)
     try:
         disk.validate(spin, physics.DEFAULT_METHOD)
         look.validate()
@@ -49,20 +50,40 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
         return  # whoever reads the shot says so
     if light is None:
         light = _add(scene, hole)
-    made_from = repr((spin, disk, look))
+    picture = settings.texture if disk_properties.shows_picture(settings) else None
+    made_from = repr((spin, disk, look, None if picture is None else (picture.name, tuple(picture.size))))
     if light.data.get(_MADE_FROM) != made_from:
-        _fill(light.data, disk, look, spin)
+        _fill(light.data, disk, look, spin, None if picture is None else disk_images.mean_of_rows(picture))
         light.data[_MADE_FROM] = made_from
-    scale = float(hole.umbra.mass_scale)
+    scale = disk_animation.value_at(hole, "umbra.mass_scale", frame)
     if not all(math.isclose(each, scale, rel_tol=1e-6) for each in light.scale):
         light.scale = (scale,) * 3
     strength = light.active_material.node_tree.nodes[_STRENGTH].inputs["Strength"]
-    if not math.isclose(strength.default_value, settings.light_strength, rel_tol=1e-6, abs_tol=1e-9):
-        strength.default_value = settings.light_strength
+    wanted = disk_animation.value_at(hole, "umbra.disk.light_strength", frame)
+    if not math.isclose(strength.default_value, wanted, rel_tol=1e-6, abs_tol=1e-9):
+        strength.default_value = wanted
 
 
-def radiance(disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: NDArray) -> NDArray:
-    """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (..., 3)."""
+def follow(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
+    """Bring the light to the scene's frame, where settings of the hole have keyframes."""
+    if find(hole) is not None and disk_animation.keyframes(hole):
+        refresh(scene, hole)
+
+
+def radiance(
+    disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: NDArray, rows: NDArray | None = None
+) -> NDArray:
+    """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
+
+    `rows`, shape (rows, 4), are the means round the disk of the picture whose colours it has.
+    """
+    if rows is not None:
+        inner, outer = disk.radii(spin)
+        depth = np.log(radius / inner) / np.log(outer / inner)
+        places = (np.arange(len(rows)) + 0.5) / len(rows)
+        mean = np.stack([np.interp(depth, places, channel) for channel in rows.T], axis=-1)
+        light = disk_look.tinted_light(look, disk, spin, radius, np.ones_like(radius), mean[:, :3])
+        return light * (look.opacity * disk_look.fade(look, disk, spin, radius))[:, None]
     mean = np.full((*radius.shape, 2), 0.5)
     thick = disk_look.density(look, disk, spin, radius, mean)
     opacity = look.opacity * np.minimum(thick * disk_look.OPACITY_REACH, 1.0)
@@ -70,7 +91,9 @@ def radiance(disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radi
     return light * (thick ** (look.gain - 1.0) * opacity)[..., None]
 
 
-def _fill(mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float) -> None:
+def _fill(
+    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, rows: NDArray | None
+) -> None:
     """Make the annulus, in units of M, its light at each vertex."""
     radii = np.geomspace(*disk.radii(spin), RINGS)
     angles = np.arange(SEGMENTS) * (2.0 * math.pi / SEGMENTS)
@@ -83,7 +106,7 @@ def _fill(mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook"
     mesh.clear_geometry()
     mesh.from_pydata(places.tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
     colours = np.ones((RINGS, SEGMENTS, 4), np.float32)
-    colours[..., :3] = radiance(disk, look, spin, radii)[:, None, :]
+    colours[..., :3] = radiance(disk, look, spin, radii, rows)[:, None, :]
     attribute = mesh.attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "POINT")
     attribute.data.foreach_set("color", colours.ravel())
     mesh.update()

@@ -63,7 +63,7 @@ class VIEW3D_PT_umbra_disk(bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "inner_at_isco")
         if settings.inner_at_isco:
-            column.label(text=f"Begins at {disk_properties.innermost_orbit(hole):.3g} M")
+            column.label(text=f"Begins at {settings.innermost_orbit:.3g} M")
         else:
             column.prop(settings, "inner_radius")
         column.prop(settings, "outer_radius")
@@ -103,8 +103,12 @@ class VIEW3D_PT_umbra_disk_detail(bpy.types.Panel):
             layout.prop(settings, name)
         layout.separator()
         layout.template_ID(settings, "texture", open="image.open", text="Texture")
-        for name in ("streaks", "clumps", "gain", "turning_speed"):
-            layout.prop(settings, name)
+        if settings.texture is not None:
+            layout.prop(settings, "texture_use")
+        if not disk_properties.shows_picture(settings):
+            for name in ("streaks", "clumps", "gain"):
+                layout.prop(settings, name)
+        layout.prop(settings, "turning_speed")
 
 
 CLASSES = (UMBRA_OT_disk_preset, VIEW3D_PT_umbra_disk, VIEW3D_PT_umbra_disk_detail)

@@ -3,8 +3,7 @@
 
 import bpy
 
-from ._physics import disk_look, metric, physics
-from .disk_nodes import PASSES
+from ._physics import disk_flux, disk_look, metric, physics
 
 # Blender saves an enum's number; identifiers are the physics' own names.
 PROFILES = (
@@ -12,6 +11,12 @@ PROFILES = (
     ("power_law", "Power Law", "Brightest at the inner edge, and dimmer outwards by a power of the radius"),
 )
 BEAMINGS = {"BOLOMETRIC": disk_look.BOLOMETRIC, "MONOCHROMATIC": disk_look.MONOCHROMATIC}
+
+# As many as the physics follows.
+MOST_IMAGES = physics.MOST_CROSSINGS
+
+# How the artist's picture is used; identifiers are saved in files.
+DENSITY, COLOUR = "DENSITY", "COLOUR"
 
 # With a new disk, the inner edge turns round in some four seconds.
 DEFAULT_SPEED = 12.0
@@ -80,7 +85,6 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_min=1.0,
         soft_max=50.0,
         update=_changed,
-        options=set(),
     )
     outer_radius: bpy.props.FloatProperty(
         name="Outer Edge",
@@ -90,7 +94,6 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_min=2.0,
         soft_max=100.0,
         update=_changed,
-        options=set(),
     )
     retrograde: bpy.props.BoolProperty(
         name="Retrograde",
@@ -105,7 +108,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         "over and under the shadow, and the thin ring at the shadow's edge",
         default=physics.DEFAULT_CROSSINGS,
         min=1,
-        max=PASSES,
+        max=MOST_IMAGES,
         update=_changed,
         options=set(),
     )
@@ -124,7 +127,6 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         min=0.0,
         max=20.0,
         update=_changed,
-        options=set(),
     )
     temperature: bpy.props.FloatProperty(
         name="Temperature",
@@ -204,9 +206,20 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     texture: bpy.props.PointerProperty(
         name="Texture",
         description="A picture in place of the built-in streaks: azimuth across, so that it should repeat, and the "
-        "logarithm of the radius from the inner edge at the top. Red thins by Streaks, green by Clumps",
+        "logarithm of the radius from the inner edge at the top",
         type=bpy.types.Image,
         update=_changed,
+    )
+    texture_use: bpy.props.EnumProperty(
+        name="Used As",
+        description="What the picture says about the disk",
+        items=(
+            (DENSITY, "Streaks", "How dense it is: red thins it by Streaks, green by Clumps", 0),
+            (COLOUR, "Colour", "Its colours are the disk's own, not those of hot matter; its alpha is the density", 1),
+        ),
+        default=DENSITY,
+        update=_changed,
+        options=set(),
     )
     light: bpy.props.BoolProperty(
         name="Light the Scene",
@@ -223,6 +236,23 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         soft_max=10.0,
         update=_changed,
     )
+    # What depends on the spin, for drivers.
+    innermost_orbit: bpy.props.FloatProperty(
+        name="Innermost Stable Orbit",
+        description="Radius of the innermost stable orbit of the disk's matter, units of M",
+        get=lambda settings: metric.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
+    )
+    flux_factor: bpy.props.FloatProperty(
+        name="Flux Factor",
+        description="By which Page and Thorne's flux becomes 1 where it is largest",
+        # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
+        get=lambda settings: 1.0 / disk_flux.peak_flux(settings.id_data.umbra.spin, settings.retrograde),
+    )
+
+
+def shows_picture(settings: UmbraDiskProperties) -> bool:
+    """Whether the disk has the colours of the artist's picture."""
+    return settings.texture is not None and settings.texture_use == COLOUR
 
 
 def disk_of(settings: UmbraDiskProperties) -> "physics.Disk | None":
@@ -249,11 +279,6 @@ def use_look(settings: UmbraDiskProperties, look: "disk_look.DiskLook") -> None:
         if getattr(settings, name) != getattr(look, name):
             setattr(settings, name, getattr(look, name))
     settings.beaming = next(name for name, power in BEAMINGS.items() if power == look.beaming)
-
-
-def innermost_orbit(hole: bpy.types.Object) -> float:
-    """Radius of the innermost stable orbit of the disk's matter, units of M."""
-    return metric.isco_radius(hole.umbra.spin, prograde=not hole.umbra.disk.retrograde)
 
 
 CLASSES = (UmbraDiskProperties,)

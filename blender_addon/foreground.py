@@ -8,13 +8,13 @@ are shared: those of the collection "Umbra Foreground" are seen by the plain cam
 
 import bpy
 
-from . import compositing, lens_camera, lens_objects, shot
+from . import compositing, lens_camera, lens_objects, lens_tree, shot
 from .compositor_tree import ROLE, find_node, find_tree, has_scene_tree
 from .errors import SceneError
 from .properties import COMPOSITOR
 
 COLLECTION_NAME, BACKGROUND_NAME = "Umbra Foreground", "Umbra Background"
-LAYER, OVER = "foreground_layer", "foreground_over"
+LAYER, OVER = lens_tree.FOREGROUND_LAYER, lens_tree.FOREGROUND_OVER
 # What an artist animates about a camera.
 CAMERA_SETTINGS = (
     *("lens", "sensor_width", "sensor_height", "sensor_fit", "shift_x", "shift_y", "clip_start", "clip_end"),
@@ -23,7 +23,6 @@ DEPTH_OF_FIELD = (
     *("use_dof", "focus_object", "focus_subtarget", "focus_distance"),
     *("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"),
 )
-TREE_IS_NEW = "umbra_foreground_tree_is_new"
 
 
 def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
@@ -176,13 +175,7 @@ def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
 
 def _compose(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     """Put the second scene's picture over what the compositor gives out."""
-    tree = find_tree(scene)
-    if tree is None or (has_scene_tree() and not scene.use_nodes):
-        scene[TREE_IS_NEW] = tree is None
-        if tree is None:
-            tree = compositing.make_tree(scene)
-        else:
-            scene.use_nodes = True
+    tree = lens_tree.claim(scene)
     output = compositing.output_node(tree)
     if output is None:
         raise SceneError(f'The compositor of scene "{scene.name}" has no output node: add one.')
@@ -210,9 +203,6 @@ def _compose(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
             tree.links.new(picture.outputs["Image"], behind)
     tree.links.new(layer.outputs["Image"], front)
     tree.links.new(over.outputs[0], output.inputs[0])
-    scene.render.use_compositing = True
-    if bpy.app.background and hasattr(scene.render, "compositor_device"):
-        scene.render.compositor_device = "CPU"  # without a display there is usually no OpenGL
 
 
 def _take_out(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
@@ -226,9 +216,4 @@ def _take_out(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
         tree.nodes.remove(over)
     if layer is not None:
         tree.nodes.remove(layer)
-    if TREE_IS_NEW in scene:
-        if scene[TREE_IS_NEW]:
-            compositing.remove_tree(scene, tree)
-        if has_scene_tree():
-            scene.use_nodes = False
-        del scene[TREE_IS_NEW]
+    lens_tree.release(scene)

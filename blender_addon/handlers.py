@@ -13,7 +13,21 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import baking, disk_sync, lens_render, lens_sync, maps, messages, node_group, preview, shot, sync, world_sync
+from . import (
+    baking,
+    disk_light,
+    disk_sync,
+    lens_disk,
+    lens_render,
+    lens_sync,
+    maps,
+    messages,
+    node_group,
+    preview,
+    shot,
+    sync,
+    world_sync,
+)
 from ._physics import physics
 from .compositor_tree import check_linked, check_rendered, find_setup, is_in_use
 from .errors import MapFolderError, SceneError
@@ -54,7 +68,7 @@ def _fail(scene: bpy.types.Scene, text: str) -> None:
         messages.end_process(text)
         return
     if lens_sync.is_on(scene):
-        lens_sync.break_camera(scene)
+        lens_render.take_away(scene)
     elif world_sync.is_on(scene):
         world_sync.point_at_nothing(scene)
     else:
@@ -81,13 +95,16 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if lens_sync.is_on(scene):
         _rendering.add(scene.name)
         _guarded(lens_render.begin, scene)
-        return
+        if not lens_disk.is_in_use(scene):
+            return
     if world_sync.is_on(scene):
         return
     if bpy.app.background and getattr(scene.render, "compositor_device", "CPU") != "CPU":
         # without a display there is usually no OpenGL, and then Blender's GPU compositor ends the process
         _devices[scene.name] = scene.render.compositor_device
         scene.render.compositor_device = "CPU"
+    if lens_sync.is_on(scene):
+        return
     _guarded(_repair, scene)
     _guarded(sync.sync_sky, scene)
     _guarded(disk_sync.refresh, scene)
@@ -102,7 +119,8 @@ def _repair(scene: bpy.types.Scene) -> None:
 
 @persistent
 def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
-    """A frame begins."""
+    """A frame begins; what is changed now is still evaluated for it."""
+    _guarded(lambda each: disk_light.follow(each, shot.find_active_hole(each)), scene)
     if not _is_ours(scene):
         return
     if messages.is_ending():
@@ -117,8 +135,10 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     if _busy or depsgraph is None:
         return
     preview.on_update(scene, depsgraph)
-    if depsgraph.mode != "RENDER" and lens_sync.is_on(scene) and scene.name not in _rendering:
-        lens_sync.show_live(scene, depsgraph)
+    if depsgraph.mode != "RENDER" and scene.name not in _rendering:
+        disk_light.follow(scene, shot.find_active_hole(scene))
+        if lens_sync.is_on(scene):
+            lens_sync.show_live(scene, depsgraph)
     if depsgraph.mode != "RENDER" or scene.name not in _waiting:
         return
     _guarded(lambda each: _provide_map(each, depsgraph), scene)
@@ -153,7 +173,9 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     preview.resume()
     if scene.name in _rendering:
         _rendering.discard(scene.name)
-        _waiting.discard(scene.name)
+        if scene.name in _waiting:  # cancelled half-way
+            _waiting.discard(scene.name)
+            lens_disk.point_at_passes(scene)
         lens_render.end(scene)
         return
     if scene.name in _waiting:  # cancelled half-way
@@ -168,7 +190,7 @@ def _is_ours(scene: bpy.types.Scene) -> bool:
 
 def _take_map_away(scene: bpy.types.Scene) -> None:
     if lens_sync.is_on(scene):
-        lens_sync.break_camera(scene)
+        lens_render.take_away(scene)
         return
     if world_sync.is_on(scene):
         world_sync.check(scene)
@@ -250,6 +272,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     for scene in bpy.data.scenes:
         if lens_sync.is_on(scene) and scene.library is None:
             lens_sync.show_live(scene)
+            _guarded(disk_sync.refresh, scene)
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
             sync.repair(scene)
@@ -264,7 +287,9 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     preview.drop_live()
     for scene in bpy.data.scenes:
-        if find_setup(scene) is None and not world_sync.is_on(scene):
+        if lens_sync.is_on(scene):
+            lens_disk.point_at_passes(scene)
+        elif find_setup(scene) is None and not world_sync.is_on(scene):
             continue
         sync.refresh(scene)
         try:
@@ -275,6 +300,8 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
         if folder is not None:
             sync.move_map_path(scene, folder)
             world_sync.move_map_path(scene, folder)
+            if lens_sync.is_on(scene):
+                lens_disk.move_passes(scene, folder)
 
 
 @persistent

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import shot
+from . import lens_disk, shot
 
 # Types that a camera sees.
 VISIBLE_TYPES = {"MESH", "CURVE", "CURVES", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD", "GREASEPENCIL"}
@@ -22,6 +22,8 @@ class Placement:
     """Those that reach into the sphere where bent rays begin."""
     nearer: tuple[str, ...]
     """Those that reach nearer to the camera than the hole, and not into the sphere."""
+    amid: tuple[str, ...]
+    """Those beside or behind the hole that are nearer to it than the disk's outer edge."""
 
 
 def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Shot) -> Placement:
@@ -33,11 +35,14 @@ def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Sh
     """
     inside: set[str] = set()
     nearer: set[str] = set()
+    amid: set[str] = set()
     hole = shot.pose(shot.active_hole(scene).evaluated_get(depsgraph), "The black hole", keep_scale=True)
     middle = np.array(scene.camera.evaluated_get(depsgraph).matrix_world.translation)
     middle = 0.5 * (middle + hole.position)
     half = float(np.linalg.norm(middle - hole.position))
     sphere = scene.umbra.sphere_radius * frame.length_of_m
+    disk = frame.parameters.disk
+    reach = 0.0 if disk is None else disk.outer_radius * frame.length_of_m
     for instance in depsgraph.object_instances:
         source = instance.object
         if source.type not in VISIBLE_TYPES or not source.visible_camera or source.hide_render:
@@ -46,11 +51,14 @@ def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.Sh
         matrix = np.array(instance.matrix_world, dtype=np.float64)
         corners = np.array([tuple(corner) for corner in source.bound_box])
         low, high = corners.min(axis=0), corners.max(axis=0)
-        if _distance(matrix, low, high, hole.position) < sphere:
+        distance = _distance(matrix, low, high, hole.position)
+        if distance < sphere:
             inside.add(owner.original.name)
         elif _distance(matrix, low, high, middle) < half:
             nearer.add(owner.original.name)
-    return Placement(tuple(sorted(inside)), tuple(sorted(nearer - inside)))
+        elif distance < reach:
+            amid.add(owner.original.name)
+    return Placement(*(tuple(sorted(each)) for each in (inside, nearer - inside, amid - nearer - inside)))
 
 
 def _distance(matrix: np.ndarray, low: np.ndarray, high: np.ndarray, point: np.ndarray) -> float:
@@ -65,9 +73,10 @@ def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot
     """Sentences about what the picture lacks."""
     found = place(scene, depsgraph, frame)
     sentences = []
-    if frame.parameters.disk is not None:
+    if frame.parameters.disk is not None and not lens_disk.is_in_use(scene):
         sentences.append(
-            f'The disk of "{frame.hole_name}" is drawn by the compositor alone: choose Output: Compositor to see it.'
+            f'The disk of "{frame.hole_name}" is not drawn: switch Compositing on in Output Properties, and connect '
+            "the Image of the node Umbra Disk in the Compositor."
         )
     if found.inside:
         radius = scene.umbra.sphere_radius
@@ -75,6 +84,11 @@ def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot
             f"{listed(found.inside)} reach{'es' if len(found.inside) == 1 else ''} into the lens sphere ({radius:g} M "
             "around the hole), inside of which the camera sees nothing: move away from the hole, or make Lens Sphere "
             "smaller."
+        )
+    if found.amid:
+        sentences.append(
+            f"{listed(found.amid)} stand{'s' if len(found.amid) == 1 else ''} beyond the lens sphere and within the "
+            "disk's outer edge: the disk is drawn in front everywhere. Make the disk smaller, or move away from it."
         )
     missing = tuple(name for name in found.nearer if not in_foreground(scene, name))
     if missing:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import baking, foreground, lens_objects, lens_shader, lens_sync, messages, shot
+from . import baking, disk_sync, foreground, lens_disk, lens_objects, lens_shader, lens_sync, messages, shot
 from .errors import SceneError
 
 # The devices of scenes that are rendered on the CPU in place of a GPU, to be set back.
@@ -19,6 +19,7 @@ def begin(scene: bpy.types.Scene) -> None:
         It cannot be rendered like this.
     """
     lens_sync.check(scene)
+    disk_sync.refresh(scene)
     problem = lens_shader.device_problem(scene)
     if problem is not None:
         if not scene.umbra.cpu_fallback:
@@ -36,6 +37,12 @@ def end(scene: bpy.types.Scene) -> None:
     lens_sync.show_live(scene)
 
 
+def take_away(scene: bpy.types.Scene) -> None:
+    """Let neither camera nor disk show anything until `provide` has seen to the frame."""
+    lens_sync.break_camera(scene)
+    lens_disk.point_at_nothing(scene)
+
+
 def forget() -> None:
     """Drop what was to be set back, in a file that is gone."""
     _devices.clear()
@@ -47,16 +54,16 @@ def provide(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: shot.
     Raises
     ------
     physics.BlackHoleError
-        There is no map and it may not, or cannot, be baked; or the camera cannot bend its rays.
+        There is no map and it may not, or cannot, be baked; or the camera cannot bend its rays; or the disk's settings
+        are animated in a way that cannot be followed.
     """
+    for path, parameters in baking.maps_of(scene, frame):
+        baking.provide_map(scene, path, parameters, frame.frame)
+    if lens_disk.is_in_use(scene):
+        disk_sync.check_shot(scene, frame.parameters)
+        lens_disk.point_at_passes(scene)
     for warning in lens_objects.warnings(scene, depsgraph, frame):
         messages.warn(warning)
     if scene.umbra.foreground_scene is not None:
         foreground.copy_lens(scene.umbra.foreground_scene, scene.camera.evaluated_get(depsgraph).data)
-    if not lens_sync.uses_maps(scene):
-        lens_sync.show(scene, frame)
-        return
-    path = baking.path_of(scene, frame)
-    parameters = baking.parameters_of(scene, frame)
-    baking.provide_map(scene, path, parameters, frame.frame)
-    lens_sync.show(scene, frame, path)
+    lens_sync.show(scene, frame, baking.path_of(scene, frame) if lens_sync.uses_maps(scene) else None)

@@ -32,7 +32,7 @@ def uses_maps(scene: bpy.types.Scene) -> bool:
 def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
     """What an exit map is made from: lines in the hole's frame do not depend on how that stands in the world.
 
-    A disk has no part in it: the compositor draws that.
+    A disk has no part in it: the compositor draws that, from passes of its own.
     """
     return replace(parameters, hole_to_world=physics.IDENTITY, disk=None)
 

@@ -5,17 +5,20 @@ import bpy
 
 from . import (
     compositing,
+    disk_sync,
     foreground,
     lens_camera,
+    lens_disk,
     lens_shader,
     lens_sync,
     messages,
     preview,
+    shot,
     world_output,
     world_sync,
 )
 from ._physics import physics
-from .compositor_tree import find_setup
+from .compositor_tree import find_setup, find_tree
 from .errors import SceneError
 from .properties import COMPOSITOR, CYCLES_LENS, WORLD
 
@@ -55,6 +58,7 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
         _switching = False
     if wanted == CYCLES_LENS:
         lens_sync.show_live(scene)
+        disk_sync.refresh(scene)
     if wanted == WORLD:
         world_sync.refresh(scene)
     preview.on_output_switched(scene)
@@ -89,6 +93,9 @@ def on_switched(scene: bpy.types.Scene) -> None:
 
 def _to_lens(scene: bpy.types.Scene) -> list[str]:
     lens_sync.check(scene)
+    tree, hole = find_tree(scene), shot.find_active_hole(scene)
+    if tree is not None and hole is not None and hole.umbra.disk.enabled:
+        compositing.check_shared(scene, tree)
     lens_sync.camera_of(scene)
     lens_shader.bytecode(uses_map=False)
     for camera in lens_camera.cameras_of(scene):
@@ -144,6 +151,7 @@ def _leave_compositor(scene: bpy.types.Scene) -> None:
 
 
 def _to_compositor(scene: bpy.types.Scene) -> list[str]:
+    lens_disk.take_out(scene)
     foreground.remove(scene)
     for camera in lens_camera.cameras_of(scene):
         lens_camera.restore(camera)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import lens_sync, operators, shot, status
+from . import lens_disk, lens_sync, operators, shot, status
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION, COMPOSITOR
 
@@ -63,7 +63,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
         lensed = lens_sync.is_on(scene)
         if scene.umbra.output == COMPOSITOR and find_setup(scene) is None:
             layout.operator("umbra.setup_compositor", icon="NODE_COMPOSITING")
-        if lensed and not lens_sync.uses_maps(scene):
+        if lensed and not lens_sync.uses_maps(scene) and not lens_disk.is_in_use(scene):
             return
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")

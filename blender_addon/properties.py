@@ -337,13 +337,14 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 def _refresh(settings: UmbraSceneProperties) -> None:
     """Carry a change into the compositor or the camera, where the set-up is in place."""
-    from . import lens_sync, sync, world_sync  # they read these properties, hence not at the top
+    from . import disk_sync, lens_sync, sync, world_sync  # they read these properties, hence not at the top
 
     scene = settings.id_data
     if isinstance(scene, bpy.types.Scene) and sync.find_setup(scene) is not None:
         sync.refresh(scene)
     if isinstance(scene, bpy.types.Scene) and settings.output == CYCLES_LENS:
         lens_sync.show_live(scene)
+        disk_sync.refresh_or_warn(scene)
     if isinstance(scene, bpy.types.Scene) and settings.output == WORLD:
         world_sync.refresh(scene)
 

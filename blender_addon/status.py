@@ -4,6 +4,7 @@
 import textwrap
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -79,8 +80,8 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
         found += _world_lines(scene)
     elif find_setup(scene) is None:
         found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
-    if not lensed or lens_sync.uses_maps(scene):
-        found += _map_lines(scene, now)
+    for path, parameters in baking.maps_of(scene, now):
+        found += _map_lines(scene, now, path, parameters)
     found += _place_lines(now)
     others = len(shot.holes(scene)) - 1
     if others > 0:
@@ -111,34 +112,38 @@ def _world_lines(scene: bpy.types.Scene) -> list[Line]:
     return found
 
 
-def _map_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
+def _map_lines(
+    scene: bpy.types.Scene, now: shot.Shot, path: Path, parameters: "physics.WarpMapParameters"
+) -> list[Line]:
     folder = maps.folder(scene)
-    path = baking.path_of(scene, now)
     noun = maps.kind_of(path).noun
     found: list[Line] = []
     if not path.is_file():
         found += wrapped(f"This frame's {noun} is not baked.", "RADIOBUT_OFF")
     elif shot.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
         found += wrapped(f"This frame's {noun} is baked; rendering checks it.", "CHECKMARK")
-    elif maps.is_fresh(path, baking.parameters_of(scene, now), thorough=False):
+    elif maps.is_fresh(path, parameters, thorough=False):
         found += wrapped(f"This frame's {noun} is up to date.", "CHECKMARK")
     else:
         found += wrapped(f"This frame's {noun} is out of date.", "FILE_REFRESH")
     frames = maps.frames_of(scene)
-    found.append(Line(f"{_baked(scene, now, frames)} of {len(frames)} frames baked", "SEQUENCE"))
+    found.append(Line(f"{_baked(scene, now, frames, path, parameters)} of {len(frames)} frames baked", "SEQUENCE"))
     if folder.is_temporary:
         found += wrapped("This file is not saved: its maps are in a temporary folder.", "INFO")
     return found
 
 
-def _baked(scene: bpy.types.Scene, now: shot.Shot, frames: range) -> int:
-    size = now.parameters.map_size
-    kind = maps.kind_of(baking.path_of(scene, now))
+def _baked(
+    scene: bpy.types.Scene, now: shot.Shot, frames: range, path: Path, parameters: "physics.WarpMapParameters"
+) -> int:
+    size = parameters.map_size
+    kind = maps.kind_of(path)
     key = (maps.folder(scene).path, maps.stem(scene, now.hole_name, size), frames, kind.noun)
     moment, number = _counted.get(key, (-COUNT_INTERVAL, 0))
     if time.monotonic() - moment >= COUNT_INTERVAL:
         number = maps.count_baked(scene, now.hole_name, size, frames, kind)
-        _counted.clear()
+        if len(_counted) > 1:
+            _counted.clear()
         _counted[key] = (time.monotonic(), number)
     return number
 

@@ -4,7 +4,7 @@
 import bpy
 
 from . import disk_sync, environment, maps, node_group, shot
-from .compositor_tree import Setup, find_setup
+from .compositor_tree import Setup, find_setup, find_tree
 from .errors import SceneError
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
@@ -102,17 +102,17 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
     setup = find_setup(scene)
     if setup is None or setup.map is None:
         return
-    _read_sequence(setup.map, MAP_IMAGE_NAME, path)
-    point_passes(setup, path)
+    read_sequence(setup.map, MAP_IMAGE_NAME, path)
+    point_passes(setup.tree, path)
 
 
-def point_passes(setup: Setup, path: str) -> None:
-    """Let the disk's passes be read from beside the map."""
-    for node, crossing in disk_sync.passes_of(setup):
-        _read_sequence(node, f"Umbra Disk Pass {crossing}", maps.pass_path(path, crossing))
+def point_passes(tree: bpy.types.NodeTree, path: str) -> None:
+    """Let the disk's passes be read from beside a map."""
+    for node, crossing in disk_sync.passes_of(tree):
+        read_sequence(node, f"Umbra Disk Pass {crossing}", maps.pass_path(path, crossing))
 
 
-def _read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
+def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
     """Let an image node read one file for each frame."""
     if node.image is None or node.image.source != "SEQUENCE":
         node.image = map_image(name)
@@ -128,7 +128,9 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
     setup = find_setup(scene)
     if setup is not None and setup.map is not None and setup.map.image is not None:
         setup.map.image.reload()
-        for node, _crossing in disk_sync.passes_of(setup):
+    tree = find_tree(scene)
+    for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
+        if node.image is not None:
             node.image.reload()
 
 

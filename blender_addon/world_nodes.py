@@ -112,7 +112,9 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         one_plus_z = builder.math("ADD", header.constant, builder.dot(looking, header.shift))
         # what is no map must not make numbers that are none
         one_plus_z = builder.math("MAXIMUM", reference_render.SMALLEST_ONE_PLUS_Z, one_plus_z)
-        gain = redshift_gain(builder, one_plus_z, inputs)
+        gain = redshift_gain(
+            builder, one_plus_z, inputs.redshift_colour, inputs.redshift_brightness, inputs.temperature
+        )
     with builder.frame("Results"):
         shown = builder.math("MULTIPLY", visible, builder.math("MULTIPLY", stamped, found))
         tint = builder.select_vector(shown, (0.0, 0.0, 0.0), gain)

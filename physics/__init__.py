@@ -6,7 +6,7 @@ from .cameras import PanoramaCamera, PerspectiveCamera
 from .disk import Disk
 from .disk_pass import DiskPass
 from .disk_pass_file import read_disk_pass, write_disk_pass
-from .disk_tracer import DEFAULT_CROSSINGS, DiskResult, trace_disk
+from .disk_tracer import DEFAULT_CROSSINGS, MOST_CROSSINGS, DiskResult, trace_disk
 from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .observer import Observer
 from .sharing import MapBaker, turned_map
@@ -30,6 +30,7 @@ __all__ = [
     "DEFAULT_TOLERANCE",
     "IDENTITY",
     "METHODS",
+    "MOST_CROSSINGS",
     "MOTIONS",
     "SUPERSAMPLING",
     "Background",

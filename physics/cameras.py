@@ -8,7 +8,7 @@ left corner; the centre of pixel (column i, row j) is (i + 0.5, j + 0.5).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,6 +112,28 @@ class PerspectiveCamera:
             sensor_fit="VERTICAL",
         )
 
+    def cropped(self, column: int, row: int, width: int, height: int) -> PerspectiveCamera:
+        """Return the camera whose picture is a part of this one's, `column` pixels from its left, `row` from its top.
+
+        Raises
+        ------
+        BlackHoleError
+            For a size out of range.
+        """
+        _check_size(width, height)
+        per_pixel, fitted, tall = self._scale()
+        right = column + 0.5 * (width - self.width) + self.shift_x * fitted
+        up = (0.5 * (self.height - height) - row) * tall + self.shift_y * fitted
+        return replace(
+            self,
+            width=width,
+            height=height,
+            sensor_width=per_pixel * self.focal_length * width,
+            sensor_fit="HORIZONTAL",
+            shift_x=right / width,
+            shift_y=up / width,
+        )
+
     def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
@@ -193,6 +215,17 @@ class PanoramaCamera:
                     f"The panorama's {name} runs from {math.degrees(low):g} to {math.degrees(high):g} degrees; "
                     f"it must rise within -{math.degrees(limit):g} and {math.degrees(limit):g} degrees."
                 )
+
+    def cropped(self, column: int, row: int, width: int, height: int) -> PanoramaCamera:
+        """Return the camera whose picture is a part of this one's, `column` pixels from its left, `row` from its top.
+
+        Raises
+        ------
+        BlackHoleError
+            For a size or a part out of range.
+        """
+        longitudes, latitudes = self._angles(np.array([column, column + width]), np.array([row + height, row]))
+        return PanoramaCamera(width, height, *latitudes.tolist(), *longitudes.tolist())
 
     def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""

@@ -9,6 +9,7 @@ F = Mdot f / (4 pi r), with f of their Eq. 15n in closed form.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,6 +75,12 @@ def peak_radius(spin: float, retrograde: bool = False) -> float:
     return float(radii[np.argmax(page_thorne_flux(spin, radii, retrograde))])
 
 
+@cache
+def peak_flux(spin: float, retrograde: bool = False) -> float:
+    """Return `page_thorne_flux` where it is largest."""
+    return float(page_thorne_flux(spin, peak_radius(spin, retrograde), retrograde))
+
+
 def relative_flux(
     profile: str, spin: float, radius: ArrayLike, inner: float, exponent: float = 3.0, retrograde: bool = False
 ) -> Array:
@@ -105,5 +112,4 @@ def relative_flux(
         return np.minimum(inner / r, 1.0) ** exponent
     if profile != "novikov_thorne":
         raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
-    peak = page_thorne_flux(spin, peak_radius(spin, retrograde), retrograde)
-    return page_thorne_flux(spin, r, retrograde) / peak
+    return page_thorne_flux(spin, r, retrograde) / peak_flux(spin, retrograde)

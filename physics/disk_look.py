@@ -15,14 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from .checks import finite
+from .colour import redshift_gain
 from .disk import Disk
 from .disk_flux import relative_flux
-from .disk_texture import moving_texture
+from .disk_texture import PICTURE_CHANNELS, moving_texture
 from .errors import BlackHoleError
 from .rays import Array
 from .star_colour import black_body_colour
 
 BOLOMETRIC, MONOCHROMATIC = 4, 3
+
+# Light that is redshifted further is not seen; alphas below this one have no colour.
+SMALLEST_G, SMALLEST_ALPHA = 1e-6, 1e-6
 
 # What settings may be; amounts and shares are from 0 to 1.
 RANGES = {
@@ -155,13 +159,35 @@ def emission(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array) -
     return light
 
 
-def density(look: DiskLook, disk: Disk, spin: float, radius: Array, noise: Array) -> Array:
-    """Return how dense the disk is, 0 to 1, from streaks and clumps of shape (..., 2); faded out at its rims."""
+def tinted_light(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array, colour: Array) -> Array:
+    """Return the light of places that have colours of their own, shape (..., 3), where they are densest.
+
+    Brightness is that of `emission`; the colour is shifted as the sky's is (`colour.redshift_gain`), as light of the
+    look's temperature, whatever the radius.
+    """
+    inner, _ = disk.radii(spin)
+    flux = relative_flux(look.profile, spin, radius, inner, look.exponent, disk.retrograde)
+    brightness = flux**look.falloff * g ** (look.beaming * look.doppler_brightness) * 2.0**look.exposure
+    light: Array = colour * brightness[..., None]
+    if look.doppler_colour > 0.0:
+        light = light * redshift_gain(1.0 / np.maximum(g, SMALLEST_G), look.doppler_colour, 0.0, look.temperature)
+    return light
+
+
+def fade(look: DiskLook, disk: Disk, spin: float, radius: Array) -> Array:
+    """Return the share of the disk that is left by its soft rims, 0 to 1."""
     inner, outer = disk.radii(spin)
     depth = np.log(np.clip(radius, inner, outer) / inner) / np.log(outer / inner)
-    fade = _smooth(depth / max(look.inner_softness, 1e-3)) * _smooth((1.0 - depth) / max(look.outer_softness, 1e-3))
+    share: Array = _smooth(depth / max(look.inner_softness, 1e-3)) * _smooth(
+        (1.0 - depth) / max(look.outer_softness, 1e-3)
+    )
+    return share
+
+
+def density(look: DiskLook, disk: Disk, spin: float, radius: Array, noise: Array) -> Array:
+    """Return how dense the disk is, 0 to 1, from streaks and clumps of shape (..., 2); faded out at its rims."""
     thin = (1.0 - look.streaks * (1.0 - noise[..., 0])) * (1.0 - look.clumps * (1.0 - noise[..., 1]))
-    total: Array = fade * thin
+    total: Array = fade(look, disk, spin, radius) * thin
     return total
 
 
@@ -172,6 +198,7 @@ def shade(
     place: tuple[Array, Array, Array, Array],
     texture: Array,
     time: float,
+    period: float | None = None,
 ) -> tuple[Array, Array]:
     """Return the light, shape (..., 3), and the opacity, shape (...), of places on the disk.
 
@@ -184,14 +211,22 @@ def shade(
     place : tuple of ndarray, shape (...)
         Radius, phi, g and coverage as in `disk_pass.DiskPass`. A pixel that is partly covered holds a rim or, along a
         thin ring, all of the disk at once: the less is covered, the more it shows the mean of streaks and clumps.
-    texture : ndarray, shape (rows, columns, 2)
-        Streaks and clumps, see `disk_texture.disk_texture`.
+    texture : ndarray, shape (rows, columns, 2 or 4)
+        Streaks and clumps, see `disk_texture.disk_texture`; or a picture, linear Rec. 709 premultiplied by its alpha,
+        whose colours are the disk's and whose alpha is its density.
     time : float
         Units of M.
+    period : float, optional
+        See `disk_texture.moving_texture`.
     """
     radius, phi, g, coverage = place
     inner, outer = disk.radii(spin)
-    noise = moving_texture(texture, radius, phi, time, spin, inner, outer, disk.retrograde)
+    noise = moving_texture(texture, radius, phi, time, spin, inner, outer, disk.retrograde, period)
+    if texture.shape[2] == PICTURE_CHANNELS:
+        thick = noise[..., 3]
+        colour = noise[..., :3] / np.maximum(thick, SMALLEST_ALPHA)[..., None]
+        light = tinted_light(look, disk, spin, radius, g, colour)
+        return light, look.opacity * np.clip(thick, 0.0, 1.0) * fade(look, disk, spin, radius)
     noise = 0.5 + coverage[..., None] * (noise - 0.5)
     thick = density(look, disk, spin, radius, noise)
     light = emission(look, disk, spin, radius, g) * (thick ** (look.gain - 1.0))[..., None]

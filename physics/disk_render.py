@@ -16,7 +16,7 @@ from .reference_render import resize
 
 
 def disk_layers(
-    passes: Sequence[DiskPass], look: DiskLook, texture: Array, time: float = 0.0
+    passes: Sequence[DiskPass], look: DiskLook, texture: Array, time: float = 0.0, period: float | None = None
 ) -> tuple[Array, Array]:
     """Return the light of the disk's images, front to back, and what passes through all of them.
 
@@ -25,10 +25,12 @@ def disk_layers(
     passes : sequence of DiskPass
         All of one map, the first crossing first.
     look : DiskLook
-    texture : ndarray, shape (rows, columns, 2)
-        Streaks and clumps, see `disk_texture.disk_texture`.
+    texture : ndarray, shape (rows, columns, 2 or 4)
+        Streaks and clumps, or a picture: see `disk_look.shade`.
     time : float
         Coordinate time, units of M.
+    period : float, optional
+        How long a pattern of the texture is shown, see `disk_texture.moving_texture`.
 
     Returns
     -------
@@ -62,7 +64,7 @@ def disk_layers(
         radius, phi, g, coverage = (
             plane[seen].astype(np.float64) for plane in (one.radius, one.phi, one.g, one.coverage)
         )
-        colour, opacity = shade(look, disk, spin, (radius, phi, g, coverage), texture, time)
+        colour, opacity = shade(look, disk, spin, (radius, phi, g, coverage), texture, time, period)
         alpha = opacity * coverage
         light[seen] += (through[seen] * alpha)[:, None] * colour
         through[seen] *= 1.0 - alpha
@@ -70,16 +72,19 @@ def disk_layers(
 
 
 def over_sky(sky: Array, light: Array, through: Array) -> Array:
-    """Return the disk in front of a sky, shape (height, width, 4), brought to the sky's size; alpha 1.
+    """Return the disk in front of a picture, shape (height, width, 4), brought to its size.
 
     Parameters
     ----------
     sky : ndarray, shape (height, width, 3 or 4)
-        The lensed sky, the shadow in it.
+        The lensed sky, the shadow in it; or, premultiplied with an alpha, what a camera of bent rays sees.
     light, through : ndarray, shape (map height, map width, 3) and (map height, map width)
         From `disk_layers`, of the map's size.
     """
     height, width = sky.shape[:2]
     layers = resize(np.concatenate([light, through[..., None]], axis=-1), (width, height))
-    colours = layers[..., :3] + layers[..., 3:] * sky[..., :3]
-    return np.concatenate([colours, np.ones_like(colours[..., :1])], axis=-1)
+    if sky.shape[2] == 3:
+        sky = np.concatenate([sky, np.ones_like(sky[..., :1])], axis=-1)
+    front = np.concatenate([layers[..., :3], 1.0 - layers[..., 3:]], axis=-1)
+    picture: Array = front + layers[..., 3:] * sky
+    return picture

@@ -25,6 +25,9 @@ from .rays import Array
 
 TEXTURE_WIDTH, TEXTURE_HEIGHT = 2048, 512
 
+# A texture has two channels, streaks and clumps; a picture's are red, green, blue and alpha.
+PICTURE_CHANNELS = 4
+
 # How many turns the inner rim gets ahead of the outer one before a pattern has ended.
 SHEAR_TURNS = 1.5
 
@@ -121,12 +124,13 @@ def moving_texture(
     inner: float,
     outer: float,
     retrograde: bool = False,
+    period: float | None = None,
 ) -> Array:
     """Return the texture at places on the disk at a time, shape (..., channels), 0 to 1.
 
     Parameters
     ----------
-    texture : ndarray, shape (rows, columns, channels)
+    texture : ndarray, shape (rows, columns, 2 or 4)
         See `disk_texture`; any picture that repeats across will do.
     radius, phi : ndarray, shape (...)
         Units of M, and radians.
@@ -134,12 +138,24 @@ def moving_texture(
         Coordinate time, units of M.
     spin, inner, outer, retrograde
         The disk.
+    period : float, optional
+        How long a pattern is shown, units of M; `pattern_period` of this disk by default. A shot whose spin or edges
+        change needs one for all of its frames.
+
+    Notes
+    -----
+    A picture of four channels is one of colours, premultiplied: its two patterns are mixed as they are.
     """
     omega = orbital_frequency(spin, radius, retrograde)
+    if period is None:
+        period = pattern_period(spin, inner, outer, retrograde)
+    middle = 0.0 if texture.shape[2] == PICTURE_CHANNELS else 0.5
     total = np.zeros((*np.shape(radius), texture.shape[2]))
     squares = 0.0
-    for age, share, turn in pattern_shares(time, pattern_period(spin, inner, outer, retrograde)):
-        total += share * (look_up(texture, radius, phi - omega * age + turn, inner, outer) - 0.5)
+    for age, share, turn in pattern_shares(time, period):
+        total += share * (look_up(texture, radius, phi - omega * age + turn, inner, outer) - middle)
         squares += share * share
+    if texture.shape[2] == PICTURE_CHANNELS:
+        return total
     # Two patterns that know nothing of each other would average out to less contrast than one has.
     return np.clip(0.5 + total / math.sqrt(squares), 0.0, 1.0)

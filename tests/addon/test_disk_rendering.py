@@ -61,7 +61,8 @@ def expected_picture(
     look = addon_module("disk_properties").look_of(settings)
     texture = addon_module("disk_images").streaks() if texture is None else texture
     time = frame * settings.turning_speed * scene.render.fps_base / scene.render.fps
-    light, through = modules.disk_render.disk_layers(passes, look, texture, time)
+    period = addon_module("disk_animation").pattern_period(scene, scene.umbra.active_hole)
+    light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
     sky = modules.reference_render.render(physics.read_warp_map(path), environment_pixels(), output_size=size).image
     picture = modules.disk_render.over_sky(sky, light, through)
     return picture, modules.reference_render.resize(light, size)
@@ -209,21 +210,132 @@ def test_animated_look_is_that_of_each_frame(
         assert_same(picture, expected, light)
 
 
-def test_animated_spin_is_refused_within_one_render_and_drawn_frame_by_frame(
-    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
+KEYFRAMES = {
+    "spin, retrograde, Page-Thorne": {"umbra.spin": (0.0, 0.99)},
+    "edges": {"umbra.disk.inner_radius": (3.0, 6.0), "umbra.disk.outer_radius": (9.0, 20.0)},
+    "amounts": {
+        "umbra.disk.doppler_brightness": (0.0, 1.0),
+        "umbra.disk.doppler_colour": (0.0, 1.0),
+        "umbra.disk.opacity": (0.3, 1.0),
+        "umbra.disk.exponent": (0.5, 3.0),
+        "umbra.disk.exposure": (0.0, 3.0),
+    },
+}
+
+
+@pytest.mark.parametrize("what", KEYFRAMES)
+def test_keyframes_are_followed_frame_by_frame(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType, what: str
 ) -> None:
+    hole = hole_with_disk(scene, inner_at_isco=what != "edges", turning_speed=200.0)
+    if "retrograde" in what:
+        hole.umbra.disk.retrograde, hole.umbra.disk.profile = True, "novikov_thorne"
+    scene.frame_start, scene.frame_end = 1, 3
+    for path, values in KEYFRAMES[what].items():
+        owner, _, name = path.rpartition(".")
+        for frame, value in zip((1, 3), values, strict=True):
+            setattr(hole.path_resolve(owner), name, value)
+            hole.keyframe_insert(path, frame=frame)
+    scene.render.filepath = str(tmp_path / "frame_####.exr")
+    bpy.ops.render.render(animation=True)
+    pictures = []
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+        pictures.append(modules.exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")[0])
+        assert_same(pictures[-1], expected, light)
+    assert np.abs(pictures[0] - pictures[1]).max() > 10.0 * LIGHT
+
+
+def test_one_period_holds_for_all_frames(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType], modules: ModuleType
+) -> None:
+    """The shortest of all frames: with it no frame's pattern is sheared further than it should be."""
     hole = hole_with_disk(scene)
-    for frame, spin in ((1, 0.2), (3, 0.9)):
+    scene.frame_start, scene.frame_end = 1, 5
+    for frame, spin in ((1, 0.2), (5, 0.9)):
         hole.umbra.spin = spin
         hole.keyframe_insert("umbra.spin", frame=frame)
-    for frame in (1, 2):
+    texture, period_of = modules.disk_texture, addon_module("disk_animation").pattern_period
+    disk = addon_module("disk_properties").disk_of(hole.umbra.disk)
+    for frame in (1, 4):
         scene.frame_set(frame)
-        picture = render(scene, tmp_path / "picture.exr", modules.exr)
-        expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
-        assert_same(picture, expected, light)
+        spins = [addon_module("disk_animation").value_at(hole, "umbra.spin", each) for each in range(1, 6)]
+        expected = min(texture.pattern_period(spin, *disk.radii(spin)) for spin in spins)
+        assert period_of(scene, hole) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("animated_by", ["strip", "driver"])
+def test_a_spin_that_cannot_be_followed_is_refused(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType], animated_by: str
+) -> None:
+    hole = hole_with_disk(scene)
+    if animated_by == "driver":
+        hole.driver_add("umbra.spin").driver.expression = "0.2+frame*0.1"
+    else:
+        for frame, spin in ((1, 0.2), (3, 0.9)):
+            hole.umbra.spin = spin
+            hole.keyframe_insert("umbra.spin", frame=frame)
+        animation = hole.animation_data
+        animation.nla_tracks.new().strips.new("Spin", 1, animation.action)
+        animation.action = None
+    scene.frame_set(1)
+    addon_module("disk_sync").refresh(scene)
     parameters = addon_module("shot").read_at(scene, 3).parameters
-    with pytest.raises(addon_module("errors").SceneError, match="is animated, which its disk cannot follow"):
+    with pytest.raises(addon_module("errors").SceneError, match=r"driver|cannot follow"):
         addon_module("disk_sync").check_shot(scene, parameters)
+
+
+@pytest.mark.parametrize("images", [1, 8])
+def test_as_many_images_as_are_asked_for(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType, images: int
+) -> None:
+    hole = hole_with_disk(scene)
+    hole.umbra.disk.crossings = images
+    hole.umbra.disk.opacity = 0.3
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == images
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
+    assert_same(picture, expected, light)
+    groups = [each.name for each in bpy.data.node_groups if each.name.startswith("Umbra Disk")]
+    assert groups == [f"Umbra Disk {images}", "Umbra Disk Image"]
+
+
+@pytest.mark.parametrize("kind", ["float", "bytes", "opaque"])
+def test_a_picture_gives_the_disk_its_colours(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType, kind: str
+) -> None:
+    """A picture with alpha of eighths, which bytes and floats hold alike, in all looks that change with the motion."""
+    height, width = 16, 64
+    row, column = np.mgrid[0:height, 0:width]
+    angle = 2.0 * math.pi * (column + 0.5) / width
+    colour = np.stack([0.5 + 0.4 * np.cos(angle), 0.4 + 0.3 * np.sin(2.0 * angle), 0.1 + 0.05 * row], axis=-1)
+    alpha = np.ones((height, width)) if kind == "opaque" else 0.5 + 0.25 * np.round(2.0 * np.cos(3.0 * angle)) * 0.5
+    image = bpy.data.images.new("Picture", width, height, float_buffer=kind != "bytes", alpha=kind != "opaque")
+    if kind == "bytes":
+        encoded = np.round(colour * 255.0) / 255.0
+        colour = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+        alpha = np.round(alpha * 255.0) / 255.0
+        pixels = np.concatenate([encoded, alpha[..., None]], axis=-1)
+    else:
+        image.colorspace_settings.name, image.alpha_mode = "Linear Rec.709", "PREMUL"
+        pixels = np.concatenate([colour * alpha[..., None], alpha[..., None]], axis=-1)
+    image.pixels.foreach_set(pixels[::-1].astype(np.float32).ravel())
+    image.pack()
+    hole = hole_with_disk(scene, texture=image, texture_use="COLOUR")
+    if kind != "opaque":
+        for name, value in {"doppler_colour": 0.8, "doppler_brightness": 1.0, "profile": "novikov_thorne"}.items():
+            setattr(hole.umbra.disk, name, value)
+    scene.frame_set(30)
+    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    premultiplied = np.concatenate([colour * alpha[..., None], alpha[..., None]], axis=-1)
+    expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), premultiplied)
+    assert_same(picture, expected, light)
+    rows = addon_module("disk_images").mean_of_rows(image)
+    np.testing.assert_allclose(rows, premultiplied.mean(axis=1), atol=2e-3)
+    hole.umbra.disk.texture_use = "DENSITY"
+    groups = [each.name for each in bpy.data.node_groups if each.name.startswith("Umbra Disk")]
+    assert groups == ["Umbra Disk 3", "Umbra Disk Image"]
 
 
 def test_objects_stand_in_front_of_the_disk(

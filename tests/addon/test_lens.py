@@ -322,14 +322,6 @@ def test_objects_inside_the_sphere_are_named(scene, addon_module) -> None:
     assert sentence.startswith('"Probe" reaches into the lens sphere')
 
 
-def test_a_disk_that_is_not_drawn_is_named(scene, addon_module) -> None:
-    hole = add_lens(scene)
-    hole.umbra.disk.enabled = True
-    frame = addon_module("shot").read(scene, bpy.context.evaluated_depsgraph_get())
-    (sentence,) = addon_module("lens_objects").warnings(scene, bpy.context.evaluated_depsgraph_get(), frame)
-    assert sentence.startswith('The disk of "Hole" is drawn by the compositor alone')
-
-
 def test_bytecode_names_no_place(addon_module) -> None:
     """It is saved with the camera, and must be the same in every session."""
     for uses_map in (False, True):

@@ -116,3 +116,21 @@ def test_directions_are_unit_vectors_of_the_pixels_shape():
 def test_impossible_cameras_are_refused_in_words(make, words):
     with pytest.raises(BlackHoleError, match=words):
         make()
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        PerspectiveCamera(96, 54, 35.0, shift_x=0.2, shift_y=-0.1),
+        PerspectiveCamera(54, 96, 35.0, shift_x=0.2, shift_y=-0.1),
+        PerspectiveCamera(96, 54, 35.0, sensor_fit="VERTICAL", sensor_height=20.0, pixel_aspect_x=2.0, shift_y=0.3),
+        PanoramaCamera(96, 54),
+        PanoramaCamera(96, 54, -0.4, 1.2, -2.0, 0.5),
+    ],
+)
+def test_a_part_of_the_picture_sees_the_same_as_the_whole(camera):
+    column, row = 17, 9
+    part = camera.cropped(column, row, 41, 30)
+    x, y = np.meshgrid(np.arange(41) + 0.5, np.arange(30) + 0.5)
+    np.testing.assert_allclose(part.directions(x, y), camera.directions(x + column, y + row), atol=1e-13)
+    assert (part.width, part.height) == (41, 30)

@@ -290,8 +290,62 @@ def test_compositing_is_that_of_a_loop_over_pixels(baked):
                 left *= 1.0 - opacity[0] * place[3]
         partly += 0.0 < left < 1.0
         assert picture[row, column, :3] == pytest.approx(colour + left * sky[row, column, :3], rel=1e-9, abs=1e-12)
+        assert picture[row, column, 3] == pytest.approx(1.0 - left + left * sky[row, column, 3], rel=1e-9)
     assert partly > 100
-    assert (picture[..., 3] == 1.0).all()
+    opaque = over_sky(sky[..., :3], light, through)
+    np.testing.assert_array_equal(opaque[..., :3], picture[..., :3])
+    np.testing.assert_allclose(opaque[..., 3], 1.0, atol=1e-15)
+
+
+PLACE = np.array([4.0, 8.0, 12.0]), np.array([0.3, 2.0, 5.0]), np.array([0.5, 1.0, 1.4]), np.ones(3)
+
+
+def test_an_even_picture_shows_its_colour_at_any_time():
+    """Premultiplied, alpha one half: two patterns mixed give back what both are; the look's factors are known."""
+    picture = np.broadcast_to([0.4, 0.2, 0.1, 0.5], (8, 16, 4))
+    disk = Disk(inner_radius=3.0, outer_radius=20.0)
+    look = DiskLook(
+        falloff=0.0, doppler_colour=0.0, doppler_brightness=0.0, exposure=1.0, opacity=0.8, inner_softness=0.0,
+        outer_softness=0.0,
+    )  # fmt: skip
+    for time in (0.0, 12.3, 4567.8):
+        light, opacity = shade(look, disk, 0.5, PLACE, picture, time)
+        np.testing.assert_allclose(light, np.tile([1.6, 0.8, 0.4], (3, 1)), rtol=1e-12)
+        np.testing.assert_allclose(opacity, 0.4, rtol=1e-12)
+    moving = dataclasses.replace(look, doppler_colour=1.0, doppler_brightness=1.0)
+    light, _ = shade(moving, disk, 0.5, PLACE, picture, 0.0)
+    # The black body's own light at g T, whose sum over all wavelengths goes by g^4, against that at T.
+    x = 1.438776877e-2 / (np.array([611.4e-9, 549.1e-9, 464.3e-9]) * look.temperature)
+    gain = np.expm1(x) / np.expm1(x / PLACE[2][:, None])
+    np.testing.assert_allclose(light, gain * [1.6, 0.8, 0.4], rtol=1e-7)  # the constant is written to ten digits
+    assert np.all(shade(look, disk, 0.5, PLACE, np.zeros((8, 16, 4)), 0.0)[1] == 0.0)
+
+
+def test_a_picture_turns_with_each_radius():
+    """A mark at one azimuth is at phi_0 + Omega t while the first pattern is alone."""
+    width, spin, inner, outer = 720, 0.6, 3.0, 20.0
+    picture = np.zeros((64, width, 4))
+    mark = np.exp(-(((np.arange(width) + 0.5) / width * 2.0 * math.pi - 3.0) ** 2) / 0.02)
+    picture[...] = mark[None, :, None]
+    period = pattern_period(spin, inner, outer)
+    phi = np.linspace(0.0, 2.0 * math.pi, 2000, endpoint=False)
+    for radius in (4.0, 9.0, 18.0):
+        shown = moving_texture(picture, np.full(2000, radius), phi, 0.5 * period, spin, inner, outer)[:, 3]
+        expected = (3.0 + orbital_frequency(spin, radius) * 0.5 * period) % (2.0 * math.pi)
+        seen = phi[np.argmax(shown)]
+        assert abs((seen - expected + math.pi) % (2.0 * math.pi) - math.pi) < 0.01
+
+
+def test_another_period_is_another_rhythm_of_the_same_patterns():
+    radius, phi = np.full(50, 6.0), np.linspace(0.0, 6.0, 50)
+    disk = 0.6, 3.0, 20.0
+    own = pattern_period(*disk)
+    default = moving_texture(TEXTURE, radius, phi, 31.0, *disk)
+    np.testing.assert_array_equal(moving_texture(TEXTURE, radius, phi, 31.0, *disk, period=own), default)
+    # Half-way through its life a pattern is alone: the first has turned for half of the period that is given.
+    alone = moving_texture(TEXTURE, radius, phi, 10.0, *disk, period=20.0)
+    turned = look_up(TEXTURE, radius, phi - orbital_frequency(0.6, radius) * 10.0, 3.0, 20.0)
+    np.testing.assert_allclose(alone, turned, atol=1e-12)
 
 
 def test_passes_that_do_not_belong_together_are_refused(baked):
