@@ -208,19 +208,10 @@ def path_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> Path:
     return maps.map_path(scene, frame_shot.hole_name, frame_shot.parameters.map_size, frame_shot.frame)
 
 
-def map_at(
-    scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None
-) -> "tuple[Path, physics.WarpMapParameters]":
-    """Where the map of any frame lies, or will lie, and what it is made from; see `shot.read_at`."""
-    layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
-    frame_shot = shot.read_at(scene, frame, layer)
-    return path_of(scene, frame_shot), parameters_of(scene, frame_shot)
-
-
 def maps_at(
     scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None
 ) -> "list[tuple[Path, physics.WarpMapParameters]]":
-    """All that any frame needs baked, as `maps_of` says."""
+    """All that any frame needs baked, as `maps_of` says; see `shot.read_at`."""
     layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
     return maps_of(scene, shot.read_at(scene, frame, layer))
 

@@ -25,7 +25,7 @@ FAULTY = (State.STALE, State.FOREIGN, State.DAMAGED)
 
 @dataclass(frozen=True)
 class FrameState:
-    """The map of one frame, its disk's passes counted in."""
+    """The maps of one frame: one, its disk's passes counted in, or with the Cycles Lens two."""
 
     frame: int
     path: Path
@@ -37,6 +37,8 @@ class FrameState:
     """Files of the same frame that its settings have no use for any more."""
     baker: str | None = None
     """The process that is baking it now."""
+    faulty: tuple[tuple[Path, str], ...] = ()
+    """Maps that a bake would replace, and why."""
 
 
 @dataclass
@@ -190,14 +192,36 @@ def examine(
     for index, frame in enumerate(wanted):
         yield baking.Progress(frame, index / len(wanted), f"Frame {frame} ({index + 1} of {len(wanted)})")
         with baking.naming(frame, len(wanted)):
-            path, parameters = baking.map_at(scene_named(scene_name), frame, view_layer_name)
-        found = maps.check(path, parameters, thorough=thorough)
-        size = sum(_size(each) for each in (path, *maps.pass_paths(path, parameters)))
-        superseded = names.superseded(path, parameters)
-        taken = found.state is not State.VALID and claims.is_taken(path)
-        baker = claims.holder(path) if taken else None
-        listing.frames.append(FrameState(frame, path, found.state, found.fault, size, superseded, baker))
+            needed = baking.maps_at(scene_named(scene_name), frame, view_layer_name)
+        if needed:
+            listing.frames.append(_state(frame, needed, names, claims, thorough))
     return listing
+
+
+def _state(
+    frame: int,
+    needed: "list[tuple[Path, physics.WarpMapParameters]]",
+    names: FolderNames,
+    claims: claim.Claims,
+    thorough: bool,
+) -> FrameState:
+    """What the maps of a frame are; with several, the state is that of the first which does not hold."""
+    found = [(path, maps.check(path, parameters, thorough=thorough)) for path, parameters in needed]
+    path, worst = next((each for each in found if each[1].state is not State.VALID), found[0])
+    files = [each for path, parameters in needed for each in (path, *maps.pass_paths(path, parameters))]
+    own = {each.name for each in files}
+    superseded = {each for one in needed for each in names.superseded(*one) if each.name not in own}
+    taken = worst.state is not State.VALID and claims.is_taken(path)
+    return FrameState(
+        frame,
+        path,
+        worst.state,
+        worst.fault,
+        sum(_size(each) for each in files),
+        tuple(sorted(superseded)),
+        claims.holder(path) if taken else None,
+        tuple((each, one.fault) for each, one in found if one.state in FAULTY),
+    )
 
 
 def clean(
@@ -233,8 +257,7 @@ def clean(
     else:
         listing = yield from examine(scene_name, frames, view_layer_name)
         for each in listing.frames:
-            if each.state in FAULTY:
-                doomed.append((each.path, each.path, each.fault))
+            doomed += [(path, path, fault) for path, fault in each.faulty]
             doomed += [(path, each.path, f"{path} is out of date") for path in each.superseded]
     doomed += [(path, owner, f"{path} was left by a process that was killed") for path, owner in names.leftovers]
     return _remove(doomed, dry_run)

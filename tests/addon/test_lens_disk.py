@@ -296,3 +296,23 @@ def test_what_is_not_drawn_right_is_named(scene, addon_module) -> None:
     assert [each.partition(":")[0] for each in warnings()] == [
         '"Cube" stands beyond the lens sphere and within the disk\'s outer edge'
     ]
+
+
+def test_verify_and_clean_know_the_disks_map_beside_the_exit_map(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
+    cache, baking = addon_module("cache"), addon_module("baking")
+    add_hole(scene)
+    assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
+    listing = baking.drain(cache.examine(scene.name, [scene.frame_current]))
+    assert listing.complete
+    folder = addon_module("maps").folder(scene).path
+    (disk,) = [each for each in folder.glob("*.exr") if "_exit_" not in each.name and "_disk" not in each.name]
+    assert listing.frames[0].size == sum(each.stat().st_size for each in folder.glob("*.exr"))
+    disk.write_bytes(disk.read_bytes()[:-100])
+    listing = baking.drain(cache.examine(scene.name, [scene.frame_current]))
+    assert not listing.complete
+    assert listing.frames[0].path == disk
+    removed = baking.drain(cache.clean(scene.name, [scene.frame_current])).removed
+    assert [each.path for each in removed] == [disk]
+    assert list(folder.glob("*_exit_*.exr"))

@@ -175,7 +175,7 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     scene, baking, modules = bpy.context.scene, addon_module("baking"), addon_module("_physics")
-    path, parameters = baking.map_at(scene, 1)
+    path, parameters = baking.maps_at(scene, 1)[0]
     claim = claim_elsewhere(path, modules.claim)
     waits = []
 
@@ -203,7 +203,7 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
 def test_a_render_that_waits_can_be_stopped(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    path, _parameters = addon_module("baking").map_at(bpy.context.scene, 1)
+    path, _parameters = addon_module("baking").maps_at(bpy.context.scene, 1)[0]
     claim_elsewhere(path, addon_module("_physics").claim)
     render = f"bpy.ops.wm.open_mainfile(filepath={blend!r}); bpy.ops.render.render(animation=True)"
     with start_python(render) as process:
@@ -220,7 +220,7 @@ def test_a_bake_does_other_frames_first_and_then_waits(
     blend: str, addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, baking, modules = bpy.context.scene, addon_module("baking"), addon_module("_physics")
-    path, _parameters = baking.map_at(scene, 1)
+    path, _parameters = baking.maps_at(scene, 1)[0]
     claim = claim_elsewhere(path, modules.claim)
     monkeypatch.setattr(baking, "POLL", 2 * baking.WAIT)
     texts = []
@@ -237,7 +237,7 @@ def test_a_frame_that_is_being_baked_is_not_cleaned_away(
 ) -> None:
     scene, baking, command = bpy.context.scene, addon_module("baking"), addon_module("command")
     assert command.run(["bake", "--frames", "1-2"]) == 0
-    path, _parameters = baking.map_at(scene, 1)
+    path, _parameters = baking.maps_at(scene, 1)[0]
     claim = claim_elsewhere(path, addon_module("_physics").claim)
     half = path.with_name(f".{path.stem}.abcdefgh.tmp.exr")
     half.write_bytes(b"half")
