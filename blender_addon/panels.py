@@ -50,7 +50,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
             layout.operator("umbra.add_black_hole", text="Add Black Hole", icon="ADD")
         else:
             layout.prop(scene.umbra, "active_hole")
-            layout.row().prop(scene.umbra, "output", expand=True)
+            layout.column(align=True).prop(scene.umbra, "output", expand=True)
         _draw_lines(layout, status.lines(context))
 
         if operators.running is not None:
