@@ -21,11 +21,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning
 
 
 @pytest.fixture
-def exr(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics").exr
-
-
-@pytest.fixture
 def scene(tmp_path: Path) -> bpy.types.Scene:
     """A small scene with a camera above the disk's plane, a World of one colour, and maps of its own."""
     scene = bpy.context.scene

@@ -26,11 +26,6 @@ PIXEL_TOLERANCE = 1e-4
 
 
 @pytest.fixture
-def exr(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics").exr
-
-
-@pytest.fixture
 def physics(addon_module: Callable[[str], ModuleType]) -> ModuleType:
     return addon_module("_physics").physics
 
