@@ -9,6 +9,7 @@ from . import baking, environment, lens_sync, maps, shot
 from ._physics import accuracy, physics
 from .errors import SceneError
 from .operators import BakeOperator
+from .sidebar import HolePanel
 from .status import wrapped
 
 # The last report of each scene, by its number in this session, with its frame. Not saved: a map may change meanwhile.
@@ -81,17 +82,9 @@ class UMBRA_OT_check_accuracy(BakeOperator, bpy.types.Operator):
         self.report({level}, report.text())
 
 
-class VIEW3D_PT_umbra_accuracy(bpy.types.Panel):
+class VIEW3D_PT_umbra_accuracy(HolePanel, bpy.types.Panel):
     bl_label = "Accuracy"
-    bl_parent_id = "VIEW3D_PT_umbra"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return shot.find_active_hole(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from . import cache, lens_sync, maps, operators, status
+from .sidebar import UmbraPanel
 
 
 @dataclass(frozen=True)
@@ -105,12 +106,9 @@ def lines(scene: bpy.types.Scene) -> list[status.Line]:
     return found
 
 
-class VIEW3D_PT_umbra_cache(bpy.types.Panel):
+class VIEW3D_PT_umbra_cache(UmbraPanel, bpy.types.Panel):
     bl_label = "Verify and Clean"
     bl_parent_id = "VIEW3D_PT_umbra_maps"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod

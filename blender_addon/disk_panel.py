@@ -5,6 +5,7 @@ import bpy
 
 from . import disk_properties, shot
 from ._physics import disk_look
+from .sidebar import HolePanel, UmbraPanel
 
 # Identifiers as scripts write them -> names of `PRESETS`.
 PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in disk_look.PRESETS}
@@ -38,17 +39,9 @@ class UMBRA_OT_disk_preset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class VIEW3D_PT_umbra_disk(bpy.types.Panel):
+class VIEW3D_PT_umbra_disk(HolePanel, bpy.types.Panel):
     bl_label = "Disk"
-    bl_parent_id = "VIEW3D_PT_umbra"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
     bl_order = 1
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return shot.find_active_hole(context.scene) is not None
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(shot.find_active_hole(context.scene).umbra.disk, "enabled", text="")
@@ -83,12 +76,9 @@ class VIEW3D_PT_umbra_disk(bpy.types.Panel):
             layout.prop(settings, "light_strength")
 
 
-class VIEW3D_PT_umbra_disk_detail(bpy.types.Panel):
+class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
     bl_label = "Profile and Streaks"
     bl_parent_id = "VIEW3D_PT_umbra_disk"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import bpy
 
-from . import farm_copy, maps, shot
+from . import farm_copy, maps
 from ._physics import exr
 from .errors import SceneError
 from .operators import reporting
+from .sidebar import HolePanel
 
 SOURCES = Path(__file__).parent / "farm"
 SCRIPT = "umbra_farm.py"
@@ -112,17 +113,9 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class VIEW3D_PT_umbra_farm(bpy.types.Panel):
+class VIEW3D_PT_umbra_farm(HolePanel, bpy.types.Panel):
     bl_label = "Render Farm"
-    bl_parent_id = "VIEW3D_PT_umbra"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return shot.find_active_hole(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column()

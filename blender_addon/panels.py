@@ -6,6 +6,7 @@ import bpy
 from . import lens_disk, lens_sync, operators, shot, status
 from .compositor_tree import find_setup
 from .properties import CAMERA_ANIMATION, COMPOSITOR
+from .sidebar import UmbraPanel
 
 LOOK_CONTROLS = ("Exposure", "Redshift Colour", "Redshift Brightness", "Sky Temperature")
 PLACEMENT_CONTROLS = ("Environment Rotation", "Environment Strength")
@@ -30,13 +31,7 @@ def _draw_lines(layout: bpy.types.UILayout, lines: tuple[status.Line, ...]) -> N
         column.label(text=line.text, icon=line.icon)
 
 
-class _Panel:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
-
-
-class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
+class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
     bl_idname = "VIEW3D_PT_umbra"
     bl_label = "Black Hole"
 
@@ -70,7 +65,7 @@ class VIEW3D_PT_umbra(_Panel, bpy.types.Panel):
         row.operator("umbra.bake_animation", icon="RENDER_ANIMATION")
 
 
-class VIEW3D_PT_umbra_hole(_Panel, bpy.types.Panel):
+class VIEW3D_PT_umbra_hole(UmbraPanel, bpy.types.Panel):
     bl_label = "Hole and Camera"
     bl_parent_id = "VIEW3D_PT_umbra"
 
@@ -83,7 +78,7 @@ class VIEW3D_PT_umbra_hole(_Panel, bpy.types.Panel):
         _draw_hole(self.layout, _hole(context))
 
 
-class VIEW3D_PT_umbra_sky(_Panel, bpy.types.Panel):
+class VIEW3D_PT_umbra_sky(UmbraPanel, bpy.types.Panel):
     bl_label = "Sky"
     bl_parent_id = "VIEW3D_PT_umbra"
 
@@ -118,7 +113,7 @@ def _draw_inputs(layout: bpy.types.UILayout, group: bpy.types.Node, names: tuple
             layout.prop(socket, "default_value", text=name)
 
 
-class VIEW3D_PT_umbra_lens(_Panel, bpy.types.Panel):
+class VIEW3D_PT_umbra_lens(UmbraPanel, bpy.types.Panel):
     bl_label = "Lens"
     bl_parent_id = "VIEW3D_PT_umbra"
 
@@ -141,7 +136,7 @@ class VIEW3D_PT_umbra_lens(_Panel, bpy.types.Panel):
             layout.operator("umbra.remove_foreground", icon="X")
 
 
-class VIEW3D_PT_umbra_maps(_Panel, bpy.types.Panel):
+class VIEW3D_PT_umbra_maps(UmbraPanel, bpy.types.Panel):
     bl_label = "Warp Maps"
     bl_parent_id = "VIEW3D_PT_umbra"
     bl_options = {"DEFAULT_CLOSED"}

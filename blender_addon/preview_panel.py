@@ -3,9 +3,10 @@
 
 import bpy
 
-from . import preview, shot, status, thumbnail, world_group, world_nodes, world_output, world_sync
+from . import preview, status, thumbnail, world_group, world_nodes, world_output, world_sync
 from .errors import SceneError
 from .operators import reporting
+from .sidebar import HolePanel, UmbraPanel
 
 # Of the thumbnail, in units of the interface.
 SCALE = 9.0
@@ -46,16 +47,8 @@ def draw_header(self: bpy.types.Header, context: bpy.types.Context) -> None:
         self.layout.operator(UMBRA_OT_toggle_lensing.bl_idname, icon="SHADING_SOLID", depress=bent)
 
 
-class VIEW3D_PT_umbra_preview(bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
+class VIEW3D_PT_umbra_preview(HolePanel, bpy.types.Panel):
     bl_label = "Live Preview"
-    bl_parent_id = "VIEW3D_PT_umbra"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return shot.find_active_hole(context.scene) is not None
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(context.scene.umbra, "live_preview", text="")
@@ -71,10 +64,7 @@ class VIEW3D_PT_umbra_preview(bpy.types.Panel):
                 layout.label(text=line.text, icon=line.icon)
 
 
-class VIEW3D_PT_umbra_world(bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Umbra"
+class VIEW3D_PT_umbra_world(UmbraPanel, bpy.types.Panel):
     bl_label = "World"
     bl_parent_id = "VIEW3D_PT_umbra"
 
