@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .annulus import coverage, near_annulus, nearest_covered
 from .disk_pass import DiskPass
 from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, U, nearest_turn
-from .painting import wrapped
+from .painting import GROUP_PIXELS, wrapped
 from .rays import Array
 from .shot import WarpMapParameters
 from .tiles import (
@@ -182,8 +182,11 @@ class DiskPainting:
             if self._channels > SLOPE:
                 good &= TAIL_SHARE * tail[:, SLOPE] < np.maximum(pixel[:, SLOPE], allowed)
             good &= ~empty
-            if good.any():
-                self._fill(tiles.select(chosen[good]), coefficients[good], order)
+            settled = np.flatnonzero(good)
+            few = max(1, GROUP_PIXELS // tiles.side**2)
+            for start in range(0, len(settled), few):
+                some = settled[start : start + few]
+                self._fill(tiles.select(chosen[some]), coefficients[some], order)
             wanted[part[chosen[good | empty]], order] = False
             if tiles.side == TILE_SIDES[-1]:
                 left = chosen[~(good | empty)]
