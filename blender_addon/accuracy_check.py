@@ -5,7 +5,7 @@ from collections.abc import Generator
 
 import bpy
 
-from . import baking, environment, lens_sync, maps, shot
+from . import baking, environment, lens_sync, maps, shot, world_sync
 from ._physics import accuracy, physics
 from .errors import SceneError
 from .operators import BakeOperator
@@ -34,6 +34,10 @@ def check_frame(
     scene = bpy.data.scenes[scene_name]
     if lens_sync.is_on(scene) and not lens_sync.uses_maps(scene):
         raise SceneError("The lens traces its rays itself (Rays: No Bake): there is no map to check.")
+    if world_sync.is_on(scene):
+        raise SceneError(
+            "Check Accuracy knows no world maps: choose Output: Compositor or Cycles Lens, and bake this frame."
+        )
     layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
     frame_shot = shot.read_at(scene, scene.frame_current, layer)
     parameters = baking.parameters_of(scene, frame_shot)

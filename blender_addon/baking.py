@@ -299,6 +299,9 @@ class _Work:
                 return False
             if maps.is_fresh(path, parameters):  # somebody else has made it in the meantime
                 self._claims.release(path)
+                if path == stale[-1][0] and made:
+                    yield from self.finish_writing()
+                    yield self._progress(frame, outcome=BAKED)
                 continue
             baked = yield from self._trace(frame, path, parameters)
             yield from self.finish_writing()
@@ -407,6 +410,7 @@ def finish(scene_name: str) -> None:
             sync.refresh(scene)
         sync.forget_loaded_map(scene)
     if scene is not None and world_sync.is_on(scene):
+        world_sync.refresh(scene)
         world_sync.forget_loaded_map(scene)
 
 

@@ -152,6 +152,8 @@ class FolderNames:
 
     def superseded(self, path: Path, parameters: "physics.WarpMapParameters") -> tuple[Path, ...]:
         """Files of the same frame, size and kind beside a map that are not its own."""
+        if maps.kind_of(path) is maps.WORLD_MAP:
+            return ()
         match = self._pattern.fullmatch(path.name)
         others = self._by_frame.get((match["size"], int(match["number"])), ())
         own = {path.name, *(each.name for each in maps.pass_paths(path, parameters))}

@@ -24,6 +24,21 @@ def keyframes(hole: bpy.types.Object) -> dict[str, bpy.types.FCurve]:
     return {curve.data_path: curve for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
 
 
+def in_strips(hole: bpy.types.Object) -> set[str]:
+    """Data paths that strips of the Nonlinear Animation move."""
+    tracks = [] if hole.animation_data is None else hole.animation_data.nla_tracks
+    actions = [each.action for track in tracks if not track.mute for each in track.strips if not each.mute]
+    return {
+        curve.data_path
+        for action in actions
+        if action is not None
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    }
+
+
 def driven(hole: bpy.types.Object) -> set[str]:
     """Data paths of the hole's properties that have drivers."""
     return set() if hole.animation_data is None else {curve.data_path for curve in hole.animation_data.drivers}

@@ -109,6 +109,11 @@ def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") 
                 f'The spin or the edges of "{hole.name}" are animated in a way that its disk cannot follow: give them '
                 "keyframes of their own in place of strips of the Nonlinear Animation."
             )
+    if disk_animation.in_strips(hole) & {f"umbra.disk.{field}" for field in disk_group.LOOK_SOCKETS}:
+        raise SceneError(
+            f'Settings of the disk of "{hole.name}" are moved by strips of the Nonlinear Animation, which its picture '
+            "cannot follow: give them keyframes of their own (Object > Animation > Bake Action)."
+        )
     driven = sorted(disk_animation.driven(hole) & {disk_animation.SPIN, disk_animation.INNER, disk_animation.OUTER})
     if driven:
         raise SceneError(

@@ -14,7 +14,7 @@ from time import perf_counter
 
 import bpy
 
-from . import disk_light, foreground, lens_camera, lens_shader, lens_sync, maps, shot
+from . import disk_light, foreground, lens_camera, lens_shader, lens_sync, shot
 from ._physics import physics
 from .errors import SceneError
 from .operators import TIMER_INTERVAL, reporting
@@ -34,6 +34,11 @@ _ADDON = "umbra."  # the paths of this add-on's settings begin so
 def path_beside(blend: Path) -> Path:
     """Where the copy of a file lies: beside it, so that relative paths hold."""
     return blend.with_name(f"{blend.stem}{SUFFIX}.blend")
+
+
+def _every_frame(scene: bpy.types.Scene) -> range:
+    """The scene's frames, those between steps too: a farm's chunks have no steps."""
+    return range(scene.frame_start, scene.frame_end + 1)
 
 
 def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
@@ -255,7 +260,7 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        steps = save(scene, maps.frames_of(scene))
+        steps = save(scene, _every_frame(scene))
         while self._go_on(steps) is None:
             pass
         return {"FINISHED"}
@@ -264,7 +269,7 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         manager = context.window_manager
-        self._steps = save(context.scene, maps.frames_of(context.scene))
+        self._steps = save(context.scene, _every_frame(context.scene))
         manager.progress_begin(0.0, 1.0)
         self._timer = manager.event_timer_add(TIMER_INTERVAL, window=context.window)
         manager.modal_handler_add(self)

@@ -109,7 +109,10 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         written = save(scene, Path(bpy.path.abspath(self.directory)))
         self.report({"INFO"}, f"Wrote {', '.join(path.name for path in written)}.")
         if farm_copy.needs_copy(scene):
-            bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
+            try:
+                bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
+            except RuntimeError as error:  # what the other operator has reported
+                raise SceneError(str(error).removeprefix("Error: ").strip()) from error
         return {"FINISHED"}
 
 

@@ -20,6 +20,7 @@ from . import (
     lens_disk,
     lens_render,
     lens_sync,
+    lens_tree,
     maps,
     messages,
     node_group,
@@ -87,7 +88,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     _told.discard(scene.name)
     _noted.discard(scene.name)
-    preview.suspend()
+    _guarded(lambda _scene: preview.suspend(), scene)
     if not _is_ours(scene):
         return
     if len(shot.holes(scene)) > 1:
@@ -95,7 +96,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if lens_sync.is_on(scene):
         _rendering.add(scene.name)
         _guarded(lens_render.begin, scene)
-        if not lens_disk.is_in_use(scene):
+        if lens_tree.BEFORE not in scene:  # neither a disk nor a foreground: the compositor is not ours
             return
     if world_sync.is_on(scene):
         return
@@ -181,6 +182,8 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     if scene.name in _waiting:  # cancelled half-way
         _waiting.discard(scene.name)
         sync.refresh(scene)
+        if world_sync.is_on(scene):
+            world_sync.refresh(scene)
 
 
 def _is_ours(scene: bpy.types.Scene) -> bool:
@@ -224,7 +227,7 @@ def _provide_map(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
     path = baking.path_of(scene, frame_shot)
     baking.provide_map(scene, path, baking.parameters_of(scene, frame_shot), frame_shot.frame)
     if world_sync.is_on(scene):
-        for warning in world_sync.warnings(frame_shot):
+        for warning in world_sync.warnings(scene, frame_shot):
             messages.warn(warning)
         world_sync.check_resolved(maps.WORLD_MAP.format.read_metadata(path), frame_shot)
         world_sync.point_at_files(scene)
@@ -274,7 +277,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     for scene in bpy.data.scenes:
         if lens_sync.is_on(scene) and scene.library is None:
             lens_sync.show_live(scene)
-            _guarded(disk_sync.refresh, scene)
+            disk_sync.refresh_or_warn(scene)  # a render refuses what this only tells
         setup = find_setup(scene)
         if setup is not None and scene.library is None and setup.tree.library is None:
             sync.repair(scene)
@@ -294,6 +297,8 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
         elif find_setup(scene) is None and not world_sync.is_on(scene):
             continue
         sync.refresh(scene)
+        if world_sync.is_on(scene) and scene.library is None:
+            world_sync.point_at_files(scene)
         try:
             folder = maps.adopt(scene, Path(path)) if path and not bpy.data.filepath else None
         except MapFolderError as error:

@@ -146,7 +146,7 @@ def kind_of(path: Path) -> MapKind:
     """What a file of the folder is read as, by its name."""
     if re.search(rf"_{_WORLD_MARK}\d+\.exr$", path.name):
         return WORLD_MAP
-    return EXIT_MAP if _EXIT_MARK in path.name else WARP_MAP
+    return EXIT_MAP if re.search(rf"{_EXIT_MARK}[0-9a-f]+\.exr$", path.name) else WARP_MAP
 
 
 def blender_map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], frame: int) -> str:

@@ -66,7 +66,7 @@ def end_process(text: str) -> None:
         print(f"Error: Umbra Black Hole: {text}", file=sys.stderr)
     sys.stdout.flush()
     sys.stderr.flush()
-    if _is_ending or bpy.app.module:
+    if _is_ending or bpy.app.module or signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         os._exit(1)
     _is_ending = True
     atexit.register(os._exit, 1)  # Blender itself would end with 0

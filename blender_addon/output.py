@@ -109,11 +109,15 @@ def _to_lens(scene: bpy.types.Scene) -> list[str]:
 
 
 def _to_world(scene: bpy.types.Scene) -> list[str]:
+    is_new = world_output.lensed_world(scene) is None
     node = world_output.install(scene)
+    lens_disk.take_out(scene)
     foreground.remove(scene)
     for camera in lens_camera.cameras_of(scene):
         lens_camera.restore(camera)
     _leave_compositor(scene)
+    if not is_new:  # the artist's own values stay
+        return []
     look = scene[BEFORE].to_dict()["look"]
     world_sync.set_inputs(node, look)
     if PLACEMENT["Rotation"] in look:

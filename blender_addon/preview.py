@@ -82,6 +82,8 @@ def on_switched(scene: bpy.types.Scene) -> None:
     thumbnail.forget(scene.name)
     if world_sync.shows_live(scene):
         world_sync.drop_live(scene)
+    elif world_sync.is_on(scene):
+        world_sync.point_at_files(scene)  # after a problem it read nothing
 
 
 def on_output_switched(scene: bpy.types.Scene) -> None:
@@ -117,7 +119,7 @@ def resume() -> None:
 
 def drop_live() -> None:
     """Let all Worlds read the files of their frames, as a file that is saved should have it."""
-    for each in _states.values():
+    for each in list(_states.values()):
         each.steps = None
     for scene in bpy.data.scenes:
         if scene.library is None and world_sync.shows_live(scene):
@@ -162,7 +164,7 @@ def advance(budget: float) -> float | None:
             del _states[name]
             continue
         now = _states[name]
-        while now.steps is not None or now.changed:
+        while can_run() and (now.steps is not None or now.changed):
             try:
                 _step(scene, now)
             except physics.BlackHoleError as error:  # the panel says it too

@@ -107,9 +107,7 @@ def _world_lines(scene: bpy.types.Scene, now: shot.Shot) -> list[Line]:
         world_sync.check(scene)
     except physics.BlackHoleError as error:
         found += wrapped(str(error), "ERROR")
-    if scene.render.film_transparent:
-        found += wrapped("Film > Transparent is on: the camera does not see the World.", "ERROR")
-    for warning in world_sync.warnings(now):
+    for warning in world_sync.warnings(scene, now):
         found += wrapped(warning, "ERROR")
     return found
 

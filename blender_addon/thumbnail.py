@@ -137,7 +137,11 @@ def look(scene: bpy.types.Scene) -> dict[str, object]:
     if setup is not None:
         rotation = node.inputs["Environment Rotation"].default_value
         return values | {"rotation": tuple(rotation), "strength": node.inputs["Environment Strength"].default_value}
-    return values | {"rotation": tuple(sky.rotation), "strength": sky.strength}
+    placed = world_output.placement(scene)
+    return values | {
+        "rotation": tuple(placed.get("Rotation", sky.rotation)),
+        "strength": placed.get("Strength", sky.strength),
+    }
 
 
 def key(scene: bpy.types.Scene) -> tuple:

@@ -55,9 +55,10 @@ def install(scene: bpy.types.Scene) -> bpy.types.Node:
     of_image = scene.umbra.environment_source == "IMAGE"
     made = _world_of_image(scene) if of_image else _copy_of_world(scene)
     made[LENSED] = OF_IMAGE if of_image else OF_WORLD
-    if made.cycles.sampling_method == "AUTOMATIC":
-        made.cycles.sampling_method = "MANUAL"
-        made.cycles.sample_map_resolution = IMPORTANCE_RESOLUTION
+    sampling = getattr(made, "cycles", None)  # none where the add-on Cycles is switched off
+    if sampling is not None and sampling.sampling_method == "AUTOMATIC":
+        sampling.sampling_method = "MANUAL"
+        sampling.sample_map_resolution = IMPORTANCE_RESOLUTION
     try:
         node = _insert(made)
     except SceneError:

@@ -237,12 +237,18 @@ def check(scene: bpy.types.Scene) -> None:
     Raises
     ------
     SceneError
-        Another World was chosen.
+        Another World was chosen, or a view layer has one of its own.
     """
     if world_output.lensed_world(scene) is None:
         raise SceneError(
             f'Scene "{scene.name}" has the output World, but another World was chosen since: set Output: World again.'
         )
+    for layer in scene.view_layers:
+        if layer.use and getattr(layer, "world_override", None) is not None:
+            raise SceneError(
+                f'View layer "{layer.name}" has a World Override, which hides the lensed World: clear it in View Layer '
+                "Properties, or choose another output."
+            )
 
 
 def check_resolved(metadata: dict, frame_shot: shot.Shot) -> None:
@@ -262,8 +268,13 @@ def check_resolved(metadata: dict, frame_shot: shot.Shot) -> None:
         )
 
 
-def warnings(frame_shot: shot.Shot) -> list[str]:
+def warnings(scene: bpy.types.Scene, frame_shot: shot.Shot) -> list[str]:
     """What a render of a frame leaves out, in sentences."""
-    if frame_shot.parameters.disk is None:
-        return []
-    return [f'The disk of "{frame_shot.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.']
+    found = []
+    if scene.render.film_transparent:
+        found.append("Film > Transparent is on: the camera does not see the World.")
+    if frame_shot.parameters.disk is not None:
+        found.append(
+            f'The disk of "{frame_shot.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.'
+        )
+    return found

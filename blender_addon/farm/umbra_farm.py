@@ -26,6 +26,7 @@ import bpy
 ROLE = "umbra_role"
 SETTINGS = "umbra."
 LENS = "umbra_lens_before"
+WORLD_MAP = "umbra_world_map"
 LIGHT = "umbra_disk_light"
 COPIED_FRAMES = "umbra_farm_frames"
 READ_BY_FRAME = re.compile(r"map|disk_pass_\d+")
@@ -104,13 +105,24 @@ def compositor_of(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
     return scene.node_tree if scene.use_nodes else None
 
 
-def map_files(scene: bpy.types.Scene, frame: int) -> Iterator[Path]:
-    """The files that the compositor reads for a frame: the warp map, and the disk's passes beside it."""
+def map_images(scene: bpy.types.Scene) -> Iterator[bpy.types.Image]:
+    """The images that the compositor, or the lensed World, reads frame by frame."""
     tree = compositor_of(scene)
     for node in [] if tree is None else tree.nodes:
-        if not READ_BY_FRAME.fullmatch(node.get(ROLE, "")) or node.image is None or not is_used(node):
-            continue
-        path = Path(bpy.path.abspath(node.image.filepath, library=node.image.library))
+        if READ_BY_FRAME.fullmatch(node.get(ROLE, "")) and node.image is not None and is_used(node):
+            yield node.image
+    tree = None if scene.world is None else scene.world.node_tree
+    groups = {node.node_tree for node in ([] if tree is None else tree.nodes) if node.type == "GROUP" and not node.mute}
+    nodes = [node for group in groups if group is not None for node in group.nodes if WORLD_MAP in node]
+    if any(node.image is None or node.image.source != "SEQUENCE" for node in nodes):
+        raise Fault("The lensed World reads no maps: open the file with the add-on and save it again.")
+    yield from {node.image for node in nodes}
+
+
+def map_files(scene: bpy.types.Scene, frame: int) -> Iterator[Path]:
+    """The files that are read for a frame: a warp map and the disk's passes beside it, or a world map."""
+    for image in map_images(scene):
+        path = Path(bpy.path.abspath(image.filepath, library=image.library))
         beginning, number = re.fullmatch(r"(.*?)(\d*)", path.stem).groups()
         yield path.with_name(f"{beginning}{frame % SEQUENCE_LENGTH:0{len(number)}d}{path.suffix}")
 

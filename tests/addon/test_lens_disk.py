@@ -311,3 +311,32 @@ def test_verify_and_clean_know_the_disks_map_beside_the_exit_map(
     removed = baking.drain(cache.clean(scene.name, [scene.frame_current])).removed
     assert [each.path for each in removed] == [disk]
     assert list(folder.glob("*_exit_*.exr"))
+
+
+def test_the_command_bakes_the_disk_of_a_lens_without_maps(
+    scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    scene.umbra.lens_rays = "IN_SHADER"
+    assert addon_module("command").run(["bake", f"--frames={scene.frame_current}"]) == 0
+    assert list((tmp_path / "maps").glob("*_disk1_*.exr"))
+
+
+def test_strips_that_move_the_look_are_refused(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
+    hole = add_hole(scene)
+    hole.umbra.disk.keyframe_insert("exposure", frame=1)
+    action, animation = hole.animation_data.action, hole.animation_data
+    strip = animation.nla_tracks.new().strips.new("Look", 1, action)
+    strip.action_slot = animation.action_slot
+    animation.action = None
+    frame = addon_module("shot").read_at(scene, 1)
+    with pytest.raises(addon_module("errors").SceneError, match="strips of the Nonlinear Animation"):
+        addon_module("disk_sync").check_shot(scene, frame.parameters)
+
+
+def test_names_that_look_like_an_exit_maps(addon_module: Callable[[str], ModuleType]) -> None:
+    maps = addon_module("maps")
+    assert maps.kind_of(Path("Airlock_exit_corridor_Hole_64x36_0001.exr")) is maps.WARP_MAP
+    assert maps.kind_of(Path("Scene_Hole_64x36_0001_exit_0123456789ab.exr")) is maps.EXIT_MAP

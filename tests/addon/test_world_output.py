@@ -369,3 +369,63 @@ def test_a_disk_that_is_not_drawn_is_named(
     render(scene, tmp_path / "picture.exr", physics.exr)
     output = capfd.readouterr()
     assert 'The disk of "Hole" is not drawn by Output: World' in output.out + output.err
+
+
+def test_the_lens_disk_goes_with_the_lens(scene: bpy.types.Scene) -> None:
+    """Its nodes would draw an old disk over every picture."""
+    scene.umbra.active_hole.umbra.disk.enabled = True
+    switch("CYCLES_LENS")
+    assert "umbra_lens_tree_before" in scene
+    switch("WORLD")
+    assert "umbra_lens_tree_before" not in scene
+    tree = scene.compositing_node_group if bpy.app.version >= (5, 0) else scene.node_tree
+    assert tree is None or not any("umbra_role" in node for node in tree.nodes)
+
+
+def test_the_world_again_keeps_the_artists_values(scene: bpy.types.Scene) -> None:
+    switch()
+    group(scene).inputs["Exposure"].default_value = 3.0
+    switch()
+    assert group(scene).inputs["Exposure"].default_value == 3.0
+
+
+def test_a_saved_file_reads_the_maps_of_its_hole(scene: bpy.types.Scene, tmp_path: Path, modules: Callable) -> None:
+    switch()
+    scene.umbra.active_hole.name = "Renamed"
+    modules("world_sync").point_at_nothing(scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "renamed.blend"))
+    (image,) = {node.image for node in group(scene).node_tree.nodes if "umbra_world_map" in node}
+    assert "_Renamed_" in image.filepath
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="view layers have no World of their own")
+def test_a_world_override_is_refused(scene: bpy.types.Scene, modules: Callable) -> None:
+    switch()
+    layer = scene.view_layers[0]
+    if not hasattr(layer, "world_override"):
+        pytest.skip("view layers of this Blender have no World of their own")
+    layer.world_override = bpy.data.worlds.new("Other")
+    with pytest.raises(modules("errors").SceneError, match="World Override"):
+        modules("world_sync").check(scene)
+
+
+def test_a_farm_looks_for_world_maps(scene: bpy.types.Scene, tmp_path: Path, physics: ModuleType) -> None:
+    """Without the add-on a World without its map would be magenta, and the exit status 0."""
+    switch()
+    assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
+    blend = tmp_path / "world.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    script = Path(physics.__file__).parent / "farm" / "umbra_farm.py"
+    check = f"""
+import importlib.util, pathlib
+spec = importlib.util.spec_from_file_location("umbra_farm", {str(script)!r})
+farm = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(farm)
+bpy.ops.wm.open_mainfile(filepath={str(blend)!r})
+(path,) = farm.map_files(bpy.context.scene, 1)
+print(path.is_file(), path.name)
+"""
+    result = run_python(check)
+    assert result.returncode == 0, result.stderr
+    assert "True " in result.stdout
+    assert "_world_0001.exr" in result.stdout
