@@ -53,8 +53,10 @@ GROUP_VALUES = 1 << 20
 # The side of the tiles from which on tables serve the later images, and the rounds that their tiles ask for samples in.
 TABLE_SIDE, TABLE_ROUNDS = 64, 6
 
-# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter for differences between pixels.
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter for differences between pixels;
+# and in 1 / M for large disks, whose outer rim is next to infinity.
 LOWEST_STEP, HIGHEST_STEP = -2.0, 4.0
+FARTHEST_STEP = -0.1
 
 # Places along each side of a pixel that is divided.
 FINER = 3
@@ -79,6 +81,7 @@ class DiskPainting:
         self._view = View(parameters)
         self._samples = DiskSamples(parameters, self._view)
         self._channels = self._samples.channels
+        self._bounds = min(LOWEST_STEP / self._outer, FARTHEST_STEP), HIGHEST_STEP / self._inner
         self._width, self._height = parameters.map_size
         self._planes = np.zeros((self._disk.crossings, 4, self._height, self._width), np.float32)
         # Pixels that samples of their tile say are far from the disk, by crossing.
@@ -269,9 +272,7 @@ class DiskPainting:
         radius, phi, g = self._samples.matter(np.moveaxis(values, 1, 0))
         share = np.ones_like(radius) if covered is None else covered.astype(radius.dtype)
         for plane, channel in zip(self._planes[order], (radius, phi, g, share), strict=True):
-            if covered is not None:
-                channel *= covered
-            tiles.put(plane, channel)
+            tiles.put(plane, channel if covered is None else np.where(covered, channel, 0.0))
 
     def _write(
         self,
@@ -280,10 +281,14 @@ class DiskPainting:
         matter: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
         share: Array,
     ) -> None:
-        """Write pixels given by column and row, from radius, azimuth and g of shape (n,)."""
-        columns, rows = place
+        """Write pixels given by column and row, from radius, azimuth and g of shape (n,).
+
+        Light that cannot be, where a place was moved too far to a rim next to the horizon, leaves its pixel empty.
+        """
+        known = matter[2] > 0.0
+        columns, rows = (each[known] for each in place)
         for plane, values in zip(self._planes[order], (*matter, share), strict=True):
-            plane[rows, columns] = values
+            plane[rows, columns] = values[known]
 
     # --- pixel by pixel ------------------------------------------------------------------------------
 
@@ -315,7 +320,7 @@ class DiskPainting:
             if not len(chosen):
                 continue
             here = channels[:, chosen]
-            here[U] = np.clip(here[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
+            here[U] = np.clip(here[U], *self._bounds)
             down, across = np.gradient(here[U], axis=1), np.gradient(here[U], axis=2)
             finer = self._needs_finer(here[U], across, down)
             finer &= inside[chosen]
@@ -357,7 +362,7 @@ class DiskPainting:
             alone[order] = True
             values, _ = self._samples.at(x.ravel(), y.ravel(), alone)
             here = values[order].reshape(-1, *x.shape)
-            here[U] = np.clip(here[U], LOWEST_STEP / self._outer, HIGHEST_STEP / self._inner)
+            here[U] = np.clip(here[U], *self._bounds)
             down, across = np.gradient(here[U], axis=(1, 2))
             shares = coverage(here[U], across, down, self._inner, self._outer).reshape(len(column), -1)
             share = shares.mean(axis=1)
@@ -367,10 +372,14 @@ class DiskPainting:
             radius, phi, g = self._samples.matter(here)
             # A pixel that is partly covered, or by all of the disk at once, shows its mean: one place of it would
             # twinkle from pixel to pixel along a thin ring.
-            weights = shares[seen] / shares[seen].sum(axis=1, keepdims=True)
+            g = np.where(g > 0.0, g, 0.0)
+            weights = shares[seen] * (g > 0.0)
+            weights /= np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
             mean = [(each * weights).sum(axis=1) for each in (1.0 / radius, np.cos(phi), np.sin(phi), g)]
             azimuth = np.arctan2(mean[2], mean[1])
-            matter = [1.0 / mean[0], azimuth + 2.0 * math.pi * (azimuth < 0.0), mean[3]]
+            with np.errstate(divide="ignore"):
+                mean[0] = 1.0 / mean[0]
+            matter = [mean[0], azimuth + 2.0 * math.pi * (azimuth < 0.0), mean[3]]
             whole = share[seen] == 1.0
             centre = centres[:, start : start + group][:, seen][:, whole]
             centre[U] = np.clip(centre[U], 1.0 / self._outer, 1.0 / self._inner)

@@ -56,6 +56,7 @@ def read_disk_pass(path: PathLike) -> DiskPass:
         and ((phi >= 0.0) & (phi < np.float32(2.0 * math.pi))).all()
         and (np.isfinite(radius) & np.isfinite(g)).all()
         and (radius[seen] > 0.0).all()
+        and (g[seen] > 0.0).all()
     )
     if not (fits and disk and crossing.isdigit() and 1 <= int(crossing) <= disk["crossings"]):
         raise WarpMapError(advice(f"{path} is damaged: it holds values that no disk pass has."))

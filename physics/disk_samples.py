@@ -35,8 +35,10 @@ TABLE_SHARE = 0.35
 # Outside of this radius there are no rays of negative energy, at any latitude.
 ERGOSPHERE = 2.0
 
-# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far.
+# So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far; and in 1 / M
+# for large disks, whose outer rim is next to infinity.
 LOWEST_U, HIGHEST_U = -30.0, 20.0
+FARTHEST_U = -0.5
 
 # Channels of what is interpolated: 1 / r, the unwound azimuth, energy and angular momentum of the light for a camera
 # energy of 1, and where matter falls du / dlambda on the same scale.
@@ -56,6 +58,7 @@ class DiskSamples:
         isco = isco_radius(parameters.spin, prograde=not self._disk.retrograde)
         self._falls = self._inner < isco * (1.0 - AT_ISCO)
         self._tolerance = max(parameters.tolerance, TRACING_SHARE * PLACE_ERROR * parameters.interpolation)
+        self._bounds = min(LOWEST_U / self._outer, FARTHEST_U), HIGHEST_U / self._inner
         self._tables: dict[int, RingTable] = {}
         self.channels = SLOPE + 1 if self._falls else SLOPE
         """How many channels there are: U to MOMENTUM, and SLOPE where matter falls."""
@@ -93,7 +96,7 @@ class DiskSamples:
         return values, lost
 
     def _clipped(self, u: Array) -> Array:
-        clipped: Array = np.clip(u, LOWEST_U / self._outer, HIGHEST_U / self._inner)
+        clipped: Array = np.clip(u, *self._bounds)
         return clipped
 
     def _trace_rays(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
@@ -110,7 +113,7 @@ class DiskSamples:
                 self._parameters.method,
                 wanted[:, block],
             )
-            low, high = LOWEST_U / self._outer, HIGHEST_U / self._inner
+            low, high = self._bounds
             nowhere = np.where(found.fate == Fate.SHADOW, high, low)
             u = self._clipped(np.where(np.isnan(found.u), nowhere, found.u))
             values[:, U, block] = np.where(wanted[:, block], u, np.nan)
@@ -149,7 +152,12 @@ class DiskSamples:
         phi -= turn * np.floor(phi * (1.0 / turn))
         radius = 1.0 / u
         if self._falls:
-            radial = values[SLOPE] / (u * u)
+            # Moved to a rim, channels no longer fit together: no light of this energy and momentum has more (Eq. 3 with
+            # q = 0).
+            energy, b = values[ENERGY], values[MOMENTUM]
+            drag, p = b - spin * energy, energy * (radius * radius + spin * spin) - spin * b
+            most = np.sqrt(np.maximum(p * p - (radius * (radius - 2.0) + spin * spin) * drag * drag, 0.0))
+            radial = np.clip(values[SLOPE] / (u * u), -most, most)
             g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
         else:
             g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)

@@ -7,7 +7,7 @@ import re
 
 from .errors import BlackHoleError
 
-_PART = re.compile(r"(-?\d+)(?:-(-?\d+)(?:[x:](\d+))?)?")
+_PART = re.compile(r"(-?\d{1,18})(?:-(-?\d{1,18})(?:[x:](\d{1,18}))?)?")
 
 MOST_FRAMES = 1_000_000
 

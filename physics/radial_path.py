@@ -169,10 +169,10 @@ class RadialPath:
 
 def winding(spin: float, u: NDArray[Any]) -> NDArray[Any]:
     """Return W(u), what the azimuth of a ray winds up by on its way into the horizon, for u < 1 / r_+."""
-    outer = horizon_radius(spin)
-    inner = spin * spin / outer
-    wound: NDArray[Any] = np.log((1.0 - outer * u) / (1.0 - inner * u))
-    wound *= spin / (outer - inner)
+    inner = spin * spin / horizon_radius(spin)
+    between = 2.0 * math.sqrt((1.0 - spin) * (1.0 + spin))  # r_+ - r_-, with its digits for the fastest holes
+    wound: NDArray[Any] = np.log1p(-between * u / (1.0 - inner * u))
+    wound *= spin / between
     return wound
 
 
@@ -222,7 +222,8 @@ def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPat
 def _beyond_horizon(spin: float) -> float:
     """Return u where paths through the horizon end, before the inner one."""
     outer = 1.0 / horizon_radius(spin)
-    inner = 1.0 / (spin * spin * outer) if spin else math.inf
+    square = spin * spin
+    inner = 1.0 / (square * outer) if square else math.inf
     return min(outer + BEYOND * (inner - outer), MOST_BEYOND * outer)
 
 

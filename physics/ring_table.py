@@ -61,7 +61,7 @@ class Needs:
     tolerance: float
     """Of tracing, radians."""
     pixel: float
-    """The smallest angle that a pixel spans in the FIDO's sky, radians."""
+    """The angle between neighbouring pixels in the middle of the picture, radians."""
     pixel_error: float
     """Share of the change from pixel to pixel that interpolation may be wrong by."""
     place_error: float
@@ -238,5 +238,10 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array
         if each is u:
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
+    # Next to rays that never cross, neighbours may have been unwrapped by different turns.
+    for axis in (0, 1):
+        torn = np.abs(np.diff(azimuth, axis=axis)) > math.pi
+        edge = [(0, 1) if i == axis else (0, 0) for i in (0, 1)]
+        good &= ~np.pad(torn, edge) & ~np.pad(torn, [each[::-1] for each in edge])
     known = good | far
     return [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)], good[1:-1, 1:-1]

@@ -212,3 +212,51 @@ def test_negative_energies_have_their_redshift():
     seen = negative & (one.coverage > 0.0)
     assert seen.any()
     assert (one.g[seen] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("spin", "radius", "inclination", "inner"),
+    [(0.0, 8.0, 45.8, 2.773), (0.9, 8.0, 89.4, 1.46), (0.9, 20.0, 89.4, 2.07), (0.998, 12.0, 80.0, 1.12)],
+)
+def test_light_at_the_rim_of_falling_matter_can_be(spin, radius, inclination, inner):
+    """A place that is moved to a rim next to the horizon keeps a redshift that light can have."""
+    parameters = shot(
+        320, 180, spin=spin, radius=radius, inclination=inclination, fov=46.0, disk=Disk(inner_radius=inner)
+    )
+    for one in bake(parameters).disk_passes:
+        seen = one.coverage > 0.0
+        assert (one.g[seen] > 0.0).all()
+        assert one.g[seen].max(initial=0.0) < 30.0
+        assert not one.g[~seen].any()
+
+
+@pytest.mark.parametrize("outer", [1e3, 1e4, 1e5])
+def test_a_disk_of_any_size_has_its_second_image(outer):
+    """What is off a large disk is no less than what is off a small one."""
+    parameters = shot(
+        960, 540, spin=0.6, radius=300.0, inclination=74.5, camera=PanoramaCamera(960, 540),
+        disk=Disk(crossings=2, outer_radius=outer),
+    )
+    adaptive = bake(parameters).disk_passes[1]
+    rows, columns = np.mgrid[0:540:2, 0:960:2].reshape(2, -1)
+    exact, _ = View(parameters).crossings(columns + 0.5, rows + 0.5, 2, 1e-6, "gauss-legendre")
+    inner = parameters.disk.radii(parameters.spin)[0]
+    on_disk = (exact.u[1] > 1.5 / outer) & (exact.u[1] < 0.7 / inner)
+    assert (adaptive.coverage[rows[on_disk], columns[on_disk]] > 0.0).mean() > 0.9
+
+
+@pytest.mark.parametrize("spin", [1e-300, -1e-170])
+def test_next_to_no_spin(spin):
+    one = bake(shot(spin=spin, motion="fido", disk=Disk())).disk_passes[0]
+    other = bake(shot(spin=0.0, motion="fido", disk=Disk(retrograde=spin < 0.0))).disk_passes[0]
+    np.testing.assert_allclose(one.radius, other.radius, rtol=1e-6)
+
+
+def test_winding_keeps_its_digits():
+    """Against exact rational numbers: W = a / (r_+ - r_-) ln((1 - r_+ u) / (1 - r_- u)), in single precision too."""
+    for spin, u in ((0.5, 0.3), (1.0 - 2.0**-30, 0.25), (1.0 - 2.0**-40, 0.5)):
+        gap = 2.0 * math.sqrt((1.0 - spin) * (1.0 + spin))
+        # ln(1 - x) = -x - x^2 / 2 - ..., x = gap u / (1 - r_- u) small for the fastest holes
+        small = gap * u / (1.0 - (1.0 - 0.5 * gap) * u)
+        expected = spin / gap * sum(-(small**k) / k for k in range(1, 200))
+        assert winding(spin, np.array([u], np.float32))[0] == pytest.approx(expected, rel=2e-6)

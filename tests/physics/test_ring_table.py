@@ -144,3 +144,20 @@ def test_rays_go_on_through_infinity_and_the_horizon(spin):
                 azimuth = beyond.unwound[0, chosen] + winding(spin, found[chosen])
                 difference = azimuth - polar[chosen] - psi
                 assert np.abs((difference + math.pi) % (2.0 * math.pi) - math.pi).max() < 1e-6
+
+
+def test_the_azimuth_is_not_torn_beside_rays_that_never_cross():
+    """There columns of the grid may be unwrapped by different turns, and answers between them would be wrong by pi."""
+    parameters = dataclasses.replace(
+        shot(960, 540, spin=-0.998, radius=5.111, inclination=89.44, fov=149.0, motion="fido"),
+        disk=Disk(outer_radius=100.0, retrograde=True),
+    )
+    view = View(parameters)
+    x, y = np.mgrid[0:960:3, 0:540:3].reshape(2, -1) + 0.5
+    traced, _ = view.crossings(x, y, 3, 1e-8, "gauss-legendre")
+    inner, outer = parameters.disk.radii(parameters.spin)
+    for order, table in tables_of(parameters).items():
+        u, azimuth = table.places(*position_angles(view.light(x, y)), 2)
+        seen = np.isfinite(u) & (traced.u[order] > 1.0 / outer) & (traced.u[order] < 1.0 / inner)
+        turn = np.abs((azimuth - traced.unwound[order] + math.pi) % (2.0 * math.pi) - math.pi)
+        assert (turn[seen] < 0.1).mean() > 0.999
