@@ -172,8 +172,8 @@ def _wait_for_claim(
     SceneError
         The process was asked to end.
     """
-    print(f"Umbra: waiting for {what}, which {claims.holder(path)} bakes", flush=True)
     with stopping.stoppable() as stop:
+        print(f"Umbra: waiting for {what}, which {claims.holder(path)} bakes", flush=True)
         while not take(claims, path, parameters):
             if stop.asked:
                 raise SceneError(f"Stopped while waiting for {what}, which {claims.holder(path)} bakes.")

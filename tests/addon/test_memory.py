@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 from small_scene import run_python
 
-FRAMES = int(os.environ.get("UMBRA_LONG_SHOT_FRAMES", "60"))
+FRAMES = int(os.environ.get("UMBRA_LONG_SHOT_FRAMES", "160"))
 
-# What the process may typically grow by over so many frames, MB. A map, or a map with its disk's passes, has 0.2 MB
-# here, so a shot that kept them would grow by 2 MB; allocators drift by less, and what they or a render engine take at
-# once, and keep, is not typical. All of it together stays below the second number.
-STRIDE, ALLOWED = 10, 0.5
+# What the process may typically grow by over so many frames in the second half of the shot, MB. A map, or a map with
+# its disk's passes, has 0.2 MB here, so a shot that kept them would grow by 2 MB; allocators drift by less. Caches fill
+# in the first half, which takes some 20 MB while rendering. All of it together stays below the last number.
+STRIDE, ALLOWED = 10, 1.0
 AT_ONCE = 40.0
 
 SCRIPT = """
@@ -75,7 +75,7 @@ def test_memory_stays_flat(tmp_path: Path, work: str, size: tuple[int, int], dis
     memory, images, datablocks = zip(*noted, strict=True)
     at_a_tenth, at_the_end = memory[FRAMES // 10], memory[-1]
     print(f"{FRAMES} frames: {at_a_tenth:.1f} MB at frame {FRAMES // 10 + 1}, {at_the_end:.1f} MB at the end")
-    later = memory[FRAMES // 10 :]
+    later = memory[FRAMES // 2 :]
     assert statistics.median(b - a for a, b in zip(later, later[STRIDE:], strict=False)) < ALLOWED
     assert at_the_end - at_a_tenth < AT_ONCE
     assert len(set(images[1:])) == len(set(datablocks[1:])) == 1
