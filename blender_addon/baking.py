@@ -188,6 +188,11 @@ def parameters_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "physics.War
     return lens_sync.exit_parameters(parameters) if lens_sync.is_on(scene) else parameters
 
 
+def needs_maps(scene: bpy.types.Scene) -> bool:
+    """Whether a scene's output reads any maps: a lens that traces its rays itself does for its disk alone."""
+    return not lens_sync.is_on(scene) or lens_sync.uses_maps(scene) or lens_disk.is_in_use(scene)
+
+
 def maps_of(scene: bpy.types.Scene, frame_shot: shot.Shot) -> "list[tuple[Path, physics.WarpMapParameters]]":
     """All that a shot needs baked: where it lies, and what it is made from."""
     needed = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import cache, lens_disk, lens_sync, maps, operators, status
+from . import baking, cache, maps, operators, status
 from .sidebar import UmbraPanel
 
 
@@ -113,8 +113,7 @@ class VIEW3D_PT_umbra_cache(UmbraPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        scene = context.scene
-        return not lens_sync.is_on(scene) or lens_sync.uses_maps(scene) or lens_disk.is_in_use(scene)
+        return baking.needs_maps(context.scene)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

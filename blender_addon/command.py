@@ -12,7 +12,7 @@ from typing import TextIO, TypeVar
 
 import bpy
 
-from . import baking, cache, lens_disk, lens_sync, maps, shot, stopping
+from . import baking, cache, maps, shot, stopping
 from ._physics import frame_list, physics
 from .errors import MapFolderError, SceneError
 
@@ -87,7 +87,7 @@ Result = TypeVar("Result")
 
 def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
     shot.active_hole(scene)
-    if lens_sync.is_on(scene) and not lens_sync.uses_maps(scene) and not lens_disk.is_in_use(scene):
+    if not baking.needs_maps(scene):
         out.line("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         return DONE, {"command": "bake", "baked": 0, "kept": 0, "unresolved": 0}
     words = {baking.BAKED: "baked", baking.KEPT: "still valid"}

@@ -11,7 +11,6 @@ from . import (
     compositing,
     environment,
     foreground,
-    lens_disk,
     lens_sync,
     maps,
     output,
@@ -270,7 +269,7 @@ class BakeOperator:
     def _start(self, context: bpy.types.Context) -> Generator:
         scene = context.scene
         shot.active_hole(scene)
-        if lens_sync.is_on(scene) and not lens_sync.uses_maps(scene) and not lens_disk.is_in_use(scene):
+        if not baking.needs_maps(scene):
             raise SceneError("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         if len(shot.holes(scene)) > 1 and scene.umbra.active_hole is not None:
             self.report({"WARNING"}, _only_one_is_rendered(scene))

@@ -70,6 +70,7 @@ MARKED_CIRCLES, MARKED_PLACES = 8, 256
 # Pixels below which the spread of these places, across where it is least, makes a slim disk.
 SLIM = 8.0
 
+
 class DiskPainting:
     """The passes of a disk in the making."""
 

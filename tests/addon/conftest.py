@@ -2,15 +2,27 @@
 """Each test of the add-on starts from Blender's factory scene."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
-import bpy  # noqa: F401  before any test module asks for addon_utils, which comes with it
+import bpy  # before any test module asks for addon_utils, which comes with it
 import pytest
+from small_scene import shrink
 
 
 @pytest.fixture(autouse=True)
 def _factory_scene(factory_scene: None) -> None:
     """Reset Blender for each test in this folder."""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    """A small scene of three frames with maps of its own; a test file that needs another one makes it itself."""
+    scene = bpy.context.scene
+    shrink(scene)
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    scene.frame_start, scene.frame_end = 1, 3
+    return scene
 
 
 @pytest.fixture

@@ -8,16 +8,7 @@ from types import ModuleType, SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, render, shrink
-
-
-@pytest.fixture
-def scene(tmp_path: Path) -> bpy.types.Scene:
-    scene = bpy.context.scene
-    shrink(scene)
-    scene.umbra.map_folder = str(tmp_path / "maps")
-    scene.frame_start, scene.frame_end = 1, 3
-    return scene
+from small_scene import add_hole, render
 
 
 def maps_in(tmp_path: Path) -> dict[str, int]:

@@ -7,17 +7,8 @@ from types import ModuleType
 
 import bpy
 import pytest
-from small_scene import add_hole, shrink
+from small_scene import add_hole
 from test_baking import ESCAPE, TIMER, Window
-
-
-@pytest.fixture
-def scene(tmp_path: Path) -> bpy.types.Scene:
-    scene = bpy.context.scene
-    shrink(scene)
-    scene.umbra.map_folder = str(tmp_path / "maps")
-    scene.frame_start, scene.frame_end = 1, 3
-    return scene
 
 
 @pytest.fixture

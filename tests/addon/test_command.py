@@ -8,16 +8,7 @@ from types import ModuleType
 
 import bpy
 import pytest
-from small_scene import add_hole, shrink
-
-
-@pytest.fixture
-def scene(tmp_path: Path) -> bpy.types.Scene:
-    scene = bpy.context.scene
-    shrink(scene)
-    scene.umbra.map_folder = str(tmp_path / "maps")
-    scene.frame_start, scene.frame_end = 1, 3
-    return scene
+from small_scene import add_hole
 
 
 @pytest.fixture

@@ -17,15 +17,6 @@ Run = Callable[[str], int]
 
 
 @pytest.fixture
-def scene(tmp_path: Path) -> bpy.types.Scene:
-    scene = bpy.context.scene
-    shrink(scene)
-    scene.umbra.map_folder = str(tmp_path / "maps")
-    scene.frame_start, scene.frame_end = 1, 3
-    return scene
-
-
-@pytest.fixture
 def run(addon_module: Callable[[str], ModuleType]) -> Run:
     return lambda line: addon_module("command").run(line.split())
 
