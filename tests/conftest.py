@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,12 +15,34 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+SESSION = pytest.StashKey[pytest.Session]()
 
 # Blender reads this when bpy is first imported, so it must be set before any test module is collected: what
 # these tests install, enable and save never touches the user's own Blender.
 USER_RESOURCES = Path(tempfile.mkdtemp(prefix="umbra-tests-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(USER_RESOURCES)
 atexit.register(shutil.rmtree, USER_RESOURCES, ignore_errors=True)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Remember the session, whose exit status is the process's."""
+    session.config.stash[SESSION] = session
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the process here if Blender is in it, with all said and done.
+
+    As a Python module Blender 4.5 is only shut down when the last reference to it goes. After a long session some are
+    left, and then the process waits for one of Blender's own threads for ever.
+    """
+    session = config.stash.get(SESSION, None)
+    if session is not None and "bpy" in sys.modules:
+        shutil.rmtree(USER_RESOURCES, ignore_errors=True)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(int(session.exitstatus))
 
 
 @pytest.fixture(scope="session")
