@@ -100,6 +100,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the button; drop the preview."""
+    """Remove the button; drop the preview: nobody would point the Worlds that show it at their files later."""
     bpy.types.VIEW3D_HT_header.remove(draw_header)
+    preview.drop_live()
     preview.forget()

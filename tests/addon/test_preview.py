@@ -179,6 +179,21 @@ def test_a_hundred_changes_leave_no_images_behind(scene, preview, physics, engin
     assert [image.name for image in bpy.data.images if image.name.startswith("Umbra Live Map")] == []
 
 
+def test_switched_off_with_the_add_on_it_leaves_worlds_that_read_files(
+    scene, preview, world_sync, addon_module
+) -> None:
+    start(scene, preview)
+    assert world_sync.shows_live(scene)
+    panel = addon_module("preview_panel")
+    panel.unregister()
+    try:
+        assert not world_sync.shows_live(scene)
+        assert [image.name for image in bpy.data.images if image.name.startswith("Umbra Live Map")] == []
+        assert "world_" in bpy.path.basename(world_sync._file_image(scene).filepath)
+    finally:
+        panel.register()
+
+
 def test_the_thumbnail_shows_what_the_camera_sees(scene, preview, thumbnail, physics, tmp_path) -> None:
     """Against a render of the World: both are pictures of the same sky, the thumbnail smaller and for screens."""
     start(scene, preview)
