@@ -41,8 +41,11 @@ from .trapped import Barrier
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-# Chebyshev points that are tried, one after another; most rays need no more than the first.
-POINT_COUNTS = (16, 24, 32, 64, 128)
+# Chebyshev points that are tried, one number after another; most rays need no more than the first. Few will do where
+# the tolerance is at least this; straight into the hole the integrands are less smooth.
+POINT_COUNTS = (12, 20, 32, 64, 128)
+POINT_COUNTS_TO_HORIZON = (24, 32, 64, 128)
+FEW_POINTS_TOLERANCE = 3e-6
 
 # Multiplications of one matrix product up to which OpenBLAS stays with one thread; waking others takes longer.
 SMALL_PRODUCT = 200_000
@@ -255,12 +258,14 @@ class Places:
 def places(path: RadialPath, times: Array, tolerance: float) -> Places:
     """Return where rays are at Mino times of shape (k, n), NaN for none, with an error of `tolerance` radians.
 
-    Beyond the end of their path, which is beyond their own, rays go on along its last parabola to the vertex.
+    Beyond the end of their path, which is beyond their own, rays go on along its last parabola to the vertex, and
+    inside the horizon they turn on at their last rate.
     """
     count = len(path.b)
     found = Places.empty(len(times), count)
     waiting = np.arange(count)
-    for points in POINT_COUNTS:
+    counts = POINT_COUNTS_TO_HORIZON if path.sign > 0.0 else POINT_COUNTS
+    for points in counts if tolerance >= FEW_POINTS_TOLERANCE else counts[1:]:
         failed = []
         for start in range(0, len(waiting), CHUNK):
             index = waiting[start : start + CHUNK]
@@ -302,7 +307,7 @@ def _product(matrix: Array, values: Array) -> Array:
     return result
 
 
-_RULES = {count: _points_and_matrices(count) for count in POINT_COUNTS}
+_RULES = {count: _points_and_matrices(count) for count in {*POINT_COUNTS, *POINT_COUNTS_TO_HORIZON}}
 
 
 class _Series:
@@ -425,7 +430,10 @@ class _Series:
                 late = np.where(slope * bend < 0.0, np.minimum(late, -slope / bend), late)
                 found.u[order, ray] = u + late * (slope + 0.5 * late * bend)
                 found.u_slope[order, ray] = slope + late * bend
-                found.unwound[order, ray] = series.unwound(u, np.ones_like(end))
+                unwound = series.unwound(u, np.ones_like(end))
+                if path.wound == 1.0 and path.spin != 0.0:
+                    unwound += late * series.path.turn_rate(end, series.path.speed(end))
+                found.unwound[order, ray] = unwound
         return found
 
     def _invert(self, series: _Series, ray: Index, times: Array, last_change: float) -> Array:
