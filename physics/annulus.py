@@ -46,16 +46,18 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
     return clipped
 
 
-def coverage(u: Array, slope_x: Array, slope_y: Array, inner: float, outer: float) -> Array:
-    """Return the share of each pixel between two radii; `u` at its centre and its change from pixel to pixel."""
-    share = share_above(u - 1.0 / outer, slope_x, slope_y) - share_above(u - 1.0 / inner, slope_x, slope_y)
+def coverage(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> Array:
+    """Return the share of each pixel where u is between two values; `u` at its centre, and its change from pixel to
+    pixel."""
+    share = share_above(u - low, slope_x, slope_y) - share_above(u - high, slope_x, slope_y)
     share = np.where(share < LEAST_COVERAGE, 0.0, share)
     return np.where(share > 1.0 - LEAST_COVERAGE, 1.0, share)
 
 
-def nearest_covered(u: Array, slope_x: Array, slope_y: Array, inner: float, outer: float) -> tuple[Array, Array, Array]:
-    """Return u within the annulus, and how many pixels right and down of the centre it is met, at most half of one."""
-    inside = np.clip(u, 1.0 / outer, 1.0 / inner)
+def nearest_covered(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> tuple[Array, Array, Array]:
+    """Return u brought between two values, and how many pixels right and down of the centre it is met, at most half of
+    one."""
+    inside = np.clip(u, low, high)
     away = (inside - u) / np.maximum(slope_x * slope_x + slope_y * slope_y, FLAT * FLAT)
     return inside, np.clip(away * slope_x, -0.5, 0.5), np.clip(away * slope_y, -0.5, 0.5)
 

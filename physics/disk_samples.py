@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 
 from .metric import isco_radius
 from .orbiting_matter import circular_redshift, redshift_factor
-from .painting import wrapped
+from .painting import in_circle
 from .radial_path import winding
-from .rays import Array
-from .ring_table import Needs, RingTable, ring_tables
+from .rays import Array, Rays
+from .ring_table import REACH, Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
 from .sky_table import position_angles
 from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
 from .view import View
 
 Mask = NDArray[np.bool_]
+Matter = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+"""Radius, azimuth in [0, 2 pi) and g."""
 
 # Error of place on the disk, relative, for each radian of error of direction that is allowed.
 PLACE_ERROR = 40.0
@@ -29,15 +31,19 @@ TRACING_SHARE = 0.1
 # Where the image is crowded, this share of the way from pixel to pixel will do.
 PIXEL_ERROR = 0.03
 
-# Rays from which on a table is worthwhile, and the share of them that it is made of.
-WORTHWHILE_RAYS = 12_000
-TABLE_SHARE = 0.35
+# Tables are worthwhile for a shadow of at least this many pixels' radius. From afar that is about this in units of M.
+LEAST_SHADOW = 8.0
+SHADOW = math.sqrt(27.0)
+# The largest impact parameter of a trapped orbit, and what tables reach to, as multiples of the shadow's radius.
+LARGEST_SHADOW, AROUND_SHADOW = 7.0, 1.0 + REACH[1]
+# Places along each side of the picture that are looked at for the shadow.
+LOOKS = 16
 # Outside of this radius there are no rays of negative energy, at any latitude.
 ERGOSPHERE = 2.0
 
 # So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter any more how far; and in 1 / M
 # for large disks, whose outer rim is next to infinity.
-LOWEST_U, HIGHEST_U = -30.0, 20.0
+LOWEST_U, HIGHEST_U = -1000.0, 1000.0
 FARTHEST_U = -0.5
 
 # Channels of what is interpolated: 1 / r, the unwound azimuth, energy and angular momentum of the light for a camera
@@ -79,17 +85,13 @@ class DiskSamples:
         rays = self._view.rays(x[asked], y[asked])
         away, angle = position_angles(self._view.light(x[asked], y[asked]))
         left = wanted.copy()
-        for order, table in self._tables.items():
+        for order in self._tables:
             here = np.flatnonzero(wanted[order, asked])
-            place = table.places(away[here], angle[here], 3 if self._falls else 2)
-            known = np.isfinite(place[0])
-            here, place = here[known], place[:, known]
-            left[order, asked[here]] = False
-            one_plus_z = rays.one_plus_z[here]
-            found = [self._clipped(place[0]), place[1], one_plus_z, rays.b[here] * one_plus_z]
-            if self._falls:
-                found.append(place[2] * one_plus_z)
-            values[order, :, asked[here]] = np.stack(found, axis=1)
+            u, *others = self._from_table(order, rays.select(here), away[here], angle[here])
+            known = np.isfinite(u)
+            here = asked[here[known]]
+            left[order, here] = False
+            values[order, :, here] = np.stack([self._clipped(u), *others], axis=1)[known]
         traced = np.flatnonzero(left.any(axis=0))
         part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
         values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
@@ -126,32 +128,59 @@ class DiskSamples:
         self.rays += len(x)
         return values, lost
 
-    def make_tables(self, rays: NDArray[np.intp]) -> None:
-        """Make tables of those later images that would ask for many rays; `rays`: how many, by crossing."""
-        orders = {k: TABLE_SHARE * rays[k] for k in range(1, self._disk.crossings) if rays[k] > WORTHWHILE_RAYS}
+    def make_tables(self) -> None:
+        """Make tables of the later images, where the shadow is large enough in the picture for them."""
+        orders = range(1, self._disk.crossings)
         observer = self._parameters.observer()
+        pixel = self._parameters.pixel_angle
         stepping = self._parameters.method != DEFAULT_METHOD
-        if not orders or stepping or observer.r < ERGOSPHERE:
+        if not orders or stepping or observer.r < ERGOSPHERE or LEAST_SHADOW * pixel * observer.r > SHADOW:
+            return
+        if not self._sees_shadow(observer.r):
             return
         needs = Needs(
-            self._inner,
-            self._outer,
-            self._tolerance,
-            self._parameters.pixel_angle,
-            PIXEL_ERROR,
-            PLACE_ERROR * self._parameters.interpolation,
+            self._inner, self._outer, self._tolerance, pixel, PIXEL_ERROR, PLACE_ERROR * self._parameters.interpolation
         )
         self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
         self.rays += sum(table.rays for table in self._tables.values())
 
-    def matter(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    def _sees_shadow(self, r: float) -> bool:
+        """Return whether the surroundings of the shadow may be in the picture."""
+        width, height = self._parameters.map_size
+        x, y = np.meshgrid(np.linspace(0.0, width, LOOKS), np.linspace(0.0, height, LOOKS))
+        away = position_angles(self._view.light(x.ravel(), y.ravel()))[0].reshape(x.shape)
+        step = max(float(np.abs(np.diff(away, axis=axis)).max()) for axis in (0, 1))
+        return float(away.min()) < step + AROUND_SHADOW * math.asin(min(1.0, LARGEST_SHADOW / r))
+
+    @property
+    def rings(self) -> dict[int, RingTable]:
+        """The tables of those images that are bands around the shadow, by order, counted from 0."""
+        return {order: table for order, table in self._tables.items() if table.confined}
+
+    def at_ring(self, order: int, x: Array, y: Array, away: Array, angle: Array) -> Matter:
+        """Return the matter at `position_angles` that pixel coordinates x, y are near to, shape (n,), from the table of
+        an image; NaN where it has no answer."""
+        u, *others = self._from_table(order, self._view.rays(x, y), away, angle)
+        return self.matter(np.stack([np.clip(u, 1.0 / self._outer, 1.0 / self._inner), *others]))
+
+    def _from_table(self, order: int, rays: Rays, away: Array, angle: Array) -> list[Array]:
+        """Return the channels at position angles near those of rays, from the table of an image."""
+        place = self._tables[order].places(away, angle, 3 if self._falls else 2)
+        one_plus_z = rays.one_plus_z
+        found = [place[0], place[1], one_plus_z, rays.b * one_plus_z]
+        return [*found, place[2] * one_plus_z] if self._falls else found
+
+    def matter(self, values: NDArray[Any]) -> Matter:
         """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
+        azimuth, g = self.azimuth_and_g(values)
+        return 1.0 / values[U], in_circle(azimuth), g
+
+    def azimuth_and_g(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return azimuth, unwrapped, and g of places on the disk, from channels of shape (channels, ...)."""
         u, spin, retrograde = values[U], self._parameters.spin, self._disk.retrograde
         phi = values[PHI] + winding(spin, u)
-        turn = phi.dtype.type(2.0 * math.pi)
-        phi -= turn * np.floor(phi * (1.0 / turn))
-        radius = 1.0 / u
         if self._falls:
+            radius = 1.0 / u
             # Moved to a rim, channels no longer fit together: no light of this energy and momentum has more (Eq. 3 with
             # q = 0).
             energy, b = values[ENERGY], values[MOMENTUM]
@@ -161,11 +190,4 @@ class DiskSamples:
             g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
         else:
             g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)
-        return radius, wrapped(phi), g
-
-
-def nearest_turn(angle: Array) -> Array:
-    """Return angles brought to [-pi, pi] by whole turns."""
-    turn = 2.0 * math.pi
-    near: Array = angle - turn * np.round(angle * (1.0 / turn))
-    return near
+        return phi, g

@@ -89,8 +89,8 @@ class Painting:
         done, share = 0.0, 0.5 / len(sides)
         for side in sides:
             cells = side // TILE_SIDES[-1]
-            clear = ~_pool(touched, cells)[waiting.row // side, waiting.column // side]
-            seen = _pool(sky, cells)[waiting.row // side, waiting.column // side]
+            clear = ~pool(touched, cells)[waiting.row // side, waiting.column // side]
+            seen = pool(sky, cells)[waiting.row // side, waiting.column // side]
             good = clear & ~seen  # all shadow, as the map is from the start
             smooth = np.flatnonzero(clear & seen)
             group = max(1, BLOCK_SIZE // POINTS**2)
@@ -261,7 +261,7 @@ class Painting:
         return visibility, x, y
 
 
-def _pool(mask: Mask, cells: int) -> Mask:
+def pool(mask: Mask, cells: int) -> Mask:
     """Return whether any cell is set in each square of `cells` x `cells`."""
     rows, columns = (-(-size // cells) for size in mask.shape)
     padded = np.zeros((rows * cells, columns * cells), dtype=bool)
@@ -276,3 +276,9 @@ def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
     single = (phi + (phi < 0.0) * phi.dtype.type(turn)).astype(np.float32)
     single *= single < np.float32(turn)
     return single
+
+
+def in_circle(phi: NDArray[np.floating[Any]]) -> Image:
+    """Return any angles brought to [0, 2 pi) in single precision."""
+    turn = phi.dtype.type(2.0 * math.pi)
+    return wrapped(phi - turn * np.floor(phi * (1.0 / turn)))

@@ -21,12 +21,13 @@ e = a^2 w_+ / (2 M), s^2 = M (1 - e cos(2 chi)), and 1 / s is a Fourier series w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .quadrature import gauss_legendre
 from .rays import Array, Indices, Rays, indices
 from .sphere import cos_sin, spherical_triad
 
@@ -41,8 +42,7 @@ EXTRA_POWERS = 2
 IN_PLANE = 1e-15
 
 # For the few rays without a short series: enough for singularities 1e-8 from the path at the tightest tolerance.
-_gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
-_PLANE_RULE = _gauss_legendre(64)
+_PLANE_RULE = gauss_legendre(64)
 
 
 @dataclass(frozen=True)

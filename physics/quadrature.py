@@ -54,8 +54,11 @@ ROOT_ROUNDS = 3
 MOST_PLAIN_NODES = 14
 
 
+gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
+"""From a number of nodes to the nodes in [-1, 1] and their weights."""
+
+
 def _rule(count: int) -> tuple[list[float], list[float]]:
-    gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
     nodes, weights = gauss_legendre(count)
     return nodes.tolist(), weights.tolist()
 

@@ -15,6 +15,7 @@ what a pixel spans; elsewhere the table has no answer, and rays are traced.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,23 +28,37 @@ from .sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
 from .sphere import cos_sin
 from .trapped import around_hole, edge_angles
 
+Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-# The step of asinh(delta / w), and the fewest and most position angles of the grid.
+# The step of asinh(delta / w), and the fewest and most position angles of the grid: powers of two. More are taken where
+# the table does not answer for this share of the disk.
 STEP = 0.25
-ANGLES = (96, 512)
+ANGLES = (128, 256)
+ENOUGH = 0.9
+
+# Where a band's rims are not well known at this share of the position angles, it is no band.
+ENOUGH_ROWS = 0.75
+
 # How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
 REACH = (0.7, 1.5)
-# Error of the edge, in pixels.
+# Error of the edge, in pixels, as long as the last image is the third; each that follows is thinner by up to e^pi.
 EDGE_ERROR = 1e-3
+THIRD = 2
 
 # Position angles at which the scale is looked for, and distances from the edge there: shares of its own distance from
 # the hole's direction, from the largest to the smallest.
 SCALE_ANGLES = 16
-SHARES = REACH[0] * np.geomspace(1.0, 1e-9, 28)
+SHARES = np.geomspace(1.0, 1e-9, 28)
 
 # Of what is found there, waves up to this are kept: steps between the distances make the others.
 MOST_WAVES = 5
+
+# A table holds the image and so much of asinh(delta / w) on both sides.
+BAND_MARGIN = 1.5
+
+# Halvings that find a rim between two columns.
+RIM_ROUNDS = 12
 
 # u changes by this share of 1 / r at the inner rim over the scale.
 SCALE_CHANGE = 0.3
@@ -70,40 +85,55 @@ class Needs:
 
 @dataclass(frozen=True)
 class _Coordinates:
-    """A grid around the shadow's edge, at equal steps of position angle: delta = scale sinh(range s)."""
+    """A grid around the shadow's edge, at equal steps of position angle: delta = scale sinh(low + step j)."""
 
     edge: Array
-    """Shape (angles,), as are the next two."""
+    """Shape (angles,), as are the next three."""
     scale: Array
-    range: Array
-    s: Array
-    """Up to 1 in equal steps, shape (columns,)."""
+    low: Array
+    step: Array
+    columns: int
+
+    @property
+    def stretched(self) -> Array:
+        """asinh(delta / scale), shape (angles, columns)."""
+        return self.low[:, None] + self.step[:, None] * np.arange(self.columns)
 
     @property
     def delta(self) -> Array:
         """Distances from the edge, shape (angles, columns)."""
-        delta: Array = self.scale[:, None] * np.sinh(self.range[:, None] * self.s)
+        delta: Array = self.scale[:, None] * np.sinh(self.stretched)
         return delta
 
 
 class RingTable:
     """Where rays around the shadow's edge cross the plane for the k-th time, for one camera's place."""
 
-    def __init__(self, coordinates: _Coordinates, channels: list[Array], good: Mask, needs: Needs) -> None:
-        """`channels`: u, unwound azimuth and du / dlambda, shape (angles + 3, columns), at all but the outermost s and
-        at the angles from the one before the first to the second after the last; `good`: where all of them are known,
-        elsewhere only that they are off the disk."""
+    def __init__(self, coordinates: _Coordinates, values: Array, needs: Needs) -> None:
+        """`values`: u, unwound azimuth and du / dlambda, shape (3, angles, columns)."""
         self._angles = len(coordinates.edge)
+        channels, good, placed = _served(values, coordinates, needs)
+        self._columns = int(good.shape[1])
         around = np.arange(AROUND[0], self._angles + AROUND[-1]) % self._angles
-        self._edge, self._scale = coordinates.edge[around], coordinates.scale[around]
-        self._step = (coordinates.range * (coordinates.s[1] - coordinates.s[0]))[around]
-        self._first = 2.0 + coordinates.s[0] / (coordinates.s[1] - coordinates.s[0])
-        self._columns = int(channels[0].shape[1])
+        # The outermost columns served to tell the errors alone.
+        grid = (coordinates.edge, coordinates.scale, coordinates.low + coordinates.step, coordinates.step)
+        self._grid = [each[around] for each in grid]
         self._channels = [np.ascontiguousarray(each).ravel() for each in channels]
         self._rims = 1.0 / needs.outer, 1.0 / needs.inner
-        reach = len(AROUND)
-        cells = np.lib.stride_tricks.sliding_window_view(good, (reach, reach))
+        u = values[0][around, 1:-1]
+        on_disk = (u > self._rims[0]) & (u < self._rims[1])
+        self.answered = float(good[on_disk].mean()) if on_disk.any() else 1.0
+        """The share of the table's places on the disk that it answers for."""
+        cells = np.lib.stride_tricks.sliding_window_view(good, (len(AROUND), len(AROUND)))
         self._good = np.ascontiguousarray(cells.all(axis=(2, 3))).ravel()
+        placed = placed[-AROUND[0] :][: self._angles]
+        rims = [_Rim.of(values[0][:, 1:-1], placed, level, grid, needs) for level in self._rims]
+        known = rims[0].known & rims[1].known
+        self._band = [each[around] for rim in reversed(rims) for each in (rim.away, rim.slope)]
+        self._band_known = np.lib.stride_tricks.sliding_window_view(known[around], len(AROUND)).all(axis=1)
+        within = (u[:, -1] < self._rims[0]).all() and not (u[:, 0] < self._rims[1]).any()
+        self.confined = bool(within and np.isfinite(self._band).all() and known.mean() > ENOUGH_ROWS)
+        """Whether all of the image is in the table: it is a band around the shadow."""
 
     @property
     def rays(self) -> int:
@@ -112,13 +142,8 @@ class RingTable:
 
     def places(self, away: Array, angle: Array, channels: int) -> Array:
         """Return the first few channels at `position_angles`, shape (channels, n); NaN: no answer."""
-        row, part = angle_steps(angle, self._angles)
-        across = lagrange_weights(part, AROUND)
-        edge, scale, step = (
-            sum(weight * each.take(row + i) for i, weight in enumerate(across))
-            for each in (self._edge, self._scale, self._step)
-        )
-        place: Array = np.arcsinh((away - edge) / scale) / step - self._first
+        row, across, (edge, scale, low, step) = self._around(angle, self._grid)
+        place: Array = (np.arcsinh((away - edge) / scale) - low) / step + AROUND[0]
         inside = (place >= 0.0) & (place < self._columns - len(AROUND) + 1.0)
         place = np.where(inside, place, 0.0)
         column = place.astype(np.intp)
@@ -131,57 +156,200 @@ class RingTable:
                 both, index = weight * other, first + j
                 for component, values in zip(result, self._channels[:channels], strict=True):
                     component += both * values.take(index)
-        low, high = self._rims
         unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
-        unknown &= (result[0] >= low) & (result[0] <= high)
+        unknown &= (result[0] >= self._rims[0]) & (result[0] <= self._rims[1])
         result[:, unknown | ~inside] = np.nan
         return result
 
+    def band(self, angle: Array) -> tuple[list[Array], Mask]:
+        """Return at position angles how far the disk's inner rim is from the hole's direction, radians, and its slope
+        along the position angle, the same for the outer rim, and whether they are well known; for an image that is
+        `confined`."""
+        row, _, found = self._around(angle, self._band)
+        return found, self._band_known.take(row)
 
-def ring_tables(spin: float, observer: Observer, rays: dict[int, float], needs: Needs) -> dict[int, RingTable]:
-    """Return tables of crossings by their order, counted from 0, each made of about as many rays as `rays` says.
+    def _around(self, angle: Array, rows: list[Array]) -> tuple[Index, list[Array], list[Array]]:
+        """Return the first rows and the weights that interpolate between them, and interpolated values of rows."""
+        row, part = angle_steps(angle, self._angles)
+        across = lagrange_weights(part, AROUND)
+        found = [np.zeros(len(angle)) for _ in rows]
+        for i, weight in enumerate(across):
+            index = row + i
+            for total, each in zip(found, rows, strict=True):
+                total += weight * each.take(index)
+        return row, across, found
+
+
+@dataclass(frozen=True)
+class _Rim:
+    """One rim of a band at each of a table's position angles, shape (angles,)."""
+
+    away: Array
+    """Angle from the hole's direction, radians; NaN where there is no such rim."""
+    slope: Array
+    """Of that along the position angle."""
+    known: Mask
+    """Whether it is known to a small part of a pixel between the position angles, too."""
+
+    @classmethod
+    def of(cls, u: Array, placed: Mask, level: float, grid: Sequence[Array], needs: Needs) -> _Rim:
+        """Return where u, shape (angles, columns), falls to a level; `placed`: where it is well known; `grid`: edge,
+        scale, and asinh(delta / scale) in the first column and its step."""
+        edge, scale, low, step = grid
+        column, first = _falls_to(u, level)
+        away = edge + scale * np.sinh(low + step * column)
+        slope = (np.roll(away, -1) - np.roll(away, 1)) * (len(away) / (4.0 * math.pi))
+        wide = np.arange(-2, len(away) + 2) % len(away)
+        with np.errstate(invalid="ignore"):
+            known = AROUND_ERROR * np.abs(np.diff(away[wide], 4)) < needs.pixel_error * needs.pixel  # NaN: False
+        nodes = first[:, None] + np.array(AROUND)
+        return cls(away, slope, known & np.take_along_axis(placed, nodes, axis=1).all(axis=1))
+
+
+def _falls_to(u: Array, level: float) -> tuple[Array, Index]:
+    """Return in which column u, shape (angles, columns), falls to a level for good, NaN where that is not known; and
+    the last whole one before, at which cubics through `AROUND` are possible."""
+    columns = u.shape[1]
+    with np.errstate(invalid="ignore"):
+        above = u >= level
+    last = columns - 1 - np.argmax(above[:, ::-1], axis=1)
+    first = np.clip(last, -AROUND[0], columns - 1 - AROUND[-1])
+    nodes = np.take_along_axis(u, first[:, None] + np.array(AROUND), axis=1)
+    low, high = np.zeros(len(u)), np.ones(len(u))
+    for _ in range(RIM_ROUNDS):
+        middle = 0.5 * (low + high)
+        weights = lagrange_weights(middle, AROUND)
+        below = sum(weight * each for weight, each in zip(weights, nodes.T, strict=True)) < level
+        low, high = np.where(below, low, middle), np.where(below, middle, high)
+    found = above.any(axis=1) & (first == last) & np.isfinite(nodes).all(axis=1)
+    return np.where(found, first + low, np.nan), first
+
+
+def ring_tables(spin: float, observer: Observer, orders: Sequence[int], needs: Needs) -> dict[int, RingTable]:
+    """Return tables of some crossings, counted from 0, by their order.
 
     The observer's motion does not matter: the tables are of its FIDO's sky. It must be outside the ergosphere, where
     all rays have positive energy.
     """
-    fido = Observer.fido(observer.r, observer.theta, observer.phi)
-
-    def edge_at(angles: int) -> tuple[Array, Array, Array]:
-        """Return the edge at so many position angles, and their cosines and sines."""
-        aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, angles, endpoint=False, dtype=np.float64))
-        return edge_angles(spin, fido, aside, up, EDGE_ERROR * needs.pixel), aside, up
-
-    def cross(away: Array, aside: Array, up: Array, wanted: list[int]) -> Array:
-        """Return u, unwound azimuth and du / dlambda, shape (3, orders, angles, distances)."""
-        looking = around_hole(away, aside[:, None], up[:, None]).reshape(-1, 3)
-        light, count = rays_from_triad(spin, fido, looking), max(wanted) + 1
-        asked = np.zeros((count, len(light)), dtype=bool)
-        asked[wanted] = True
-        found = cross_plane(light, count, needs.tolerance, beyond=True, wanted=asked)
-        values = np.stack([found.u, found.unwound, found.u_slope])[:, wanted]
-        return values.reshape(3, len(wanted), *away.shape)
-
-    edge, aside, up = edge_at(SCALE_ANGLES)
-    distances = np.concatenate([-SHARES, SHARES[::-1]]) * edge[:, None]
-    scouted = cross(edge[:, None] + distances, aside, up, list(rays))[0]
-    tables = {}
-    for u, (order, wanted) in zip(scouted, rays.items(), strict=True):
-        few = _scale(u, edge, needs)
-        inside, outside = (np.arcsinh(each * edge / few) for each in REACH)
-        columns = math.ceil((inside + outside).max() / STEP)
-        angles = min(max(int(wanted / columns), ANGLES[0]), ANGLES[1]) // SCALE_ANGLES * SCALE_ANGLES
-        here, aside, up = edge_at(angles)
-        scale = _between(few, angles)
-        s = 1.0 - np.arange(columns, dtype=np.float64)[::-1] * (STEP / outside.max())
-        s = s[s > -(inside / outside).min()]
-        grid = _Coordinates(here, scale, np.arcsinh(REACH[1] * here / scale), s)
-        values = cross(here[:, None] + grid.delta, aside, up, [order])[:, 0]
-        tables[order] = RingTable(grid, *_served(values, grid, needs), needs)
+    sky = _Sky(spin, Observer.fido(observer.r, observer.theta, observer.phi), max(orders) + 1, needs)
+    few = SCALE_ANGLES
+    edge = sky.edge(few)
+    distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
+    away = edge[:, None] + distances
+    (scouted,) = sky.cross([(away, np.arange(few), few, list(orders))])
+    drafts = {order: _Draft.of(u, distances, edge, needs) for order, u in zip(orders, scouted[0], strict=True)}
+    found: dict[int, Array] = {}
+    tables: dict[int, RingTable] = {}
+    waiting, angles = list(orders), ANGLES[0]
+    while waiting:
+        # Every other row is there already, but for the first time.
+        rows = np.arange(angles) if not found else np.arange(1, angles, 2)
+        grids = {order: drafts[order].coordinates(sky.edge(angles)) for order in waiting}
+        asked = [((grids[order].edge[:, None] + grids[order].delta)[rows], rows, angles, [order]) for order in waiting]
+        for order, new in zip(waiting, sky.cross(asked), strict=True):
+            values = np.empty((3, angles, grids[order].columns))
+            values[:, rows] = new[:, 0]
+            if order in found:
+                values[:, ::2] = found[order]
+            found[order] = values
+            tables[order] = RingTable(grids[order], values, needs)
+        waiting = [order for order in waiting if tables[order].answered < ENOUGH]
+        angles *= 2
+        if angles > ANGLES[1]:
+            break
     return tables
 
 
+class _Sky:
+    """A FIDO's sky around the shadow: where its edge is, and where rays along it cross the plane."""
+
+    def __init__(self, spin: float, fido: Observer, count: int, needs: Needs) -> None:
+        """`count`: how many crossings of a ray are of interest."""
+        self._spin, self._fido, self._needs, self._count = spin, fido, needs, count
+        self._aside, self._up = cos_sin(
+            np.linspace(0.0, 2.0 * math.pi, ANGLES[1], endpoint=False, dtype=np.float64)
+        )
+        error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
+        self._edge = edge_angles(spin, fido, self._aside, self._up, error)
+
+    def edge(self, angles: int) -> Array:
+        """Return how far the edge is from the hole's direction at so many position angles, a divisor of the most."""
+        return self._edge[:: ANGLES[1] // angles]
+
+    def cross(self, asked: list[tuple[Array, Index, int, list[int]]]) -> list[Array]:
+        """Return u, unwound azimuth and du / dlambda, shape (3, orders, rows, distances), for each that is asked for.
+
+        Asked for are angles from the hole's direction, shape (rows, distances); the rows' position angles, as numbers
+        out of how many; and the orders of the crossings.
+        """
+        looking, wanted = [], []
+        for away, rows, angles, orders in asked:
+            index = rows * (ANGLES[1] // angles)
+            looking.append(around_hole(away, self._aside[index, None], self._up[index, None]).reshape(-1, 3))
+            here = np.zeros((self._count, away.size), dtype=bool)
+            here[orders] = True
+            wanted.append(here)
+        light, every = rays_from_triad(self._spin, self._fido, np.concatenate(looking)), np.concatenate(wanted, axis=1)
+        crossings = cross_plane(light, self._count, self._needs.tolerance, beyond=True, wanted=every)
+        values = np.stack([crossings.u, crossings.unwound, crossings.u_slope])
+        ends = np.cumsum([away.size for away, *_ in asked])
+        parts = np.split(values, ends[:-1], axis=2)
+        return [
+            part[:, orders].reshape(3, len(orders), *away.shape)
+            for part, (away, _, _, orders) in zip(parts, asked, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """What coordinates are made of, at `SCALE_ANGLES` position angles, shape (angles,)."""
+
+    scale: Array
+    low: Array
+    """Of asinh(delta / w)."""
+    high: Array
+
+    @classmethod
+    def of(cls, u: Array, distances: Array, edge: Array, needs: Needs) -> _Draft:
+        """Return what is found from u at distances from the edge, shape (angles, distances)."""
+        scale = _scale(u, edge, needs)
+        stretched = np.arcsinh(distances / scale[:, None])
+        band = _band(u, stretched, needs)
+        if band is None:
+            return cls(scale, stretched[:, 0], stretched[:, -1])
+        return cls(scale, band[0] - BAND_MARGIN, band[1] + BAND_MARGIN)
+
+    def coordinates(self, edge: Array) -> _Coordinates:
+        """Return coordinates at more position angles, where the edge is given."""
+        columns = math.ceil((self.high - self.low).max() / STEP) + 1
+        low, high, scale = (_waves(each, len(edge)) for each in (self.low, self.high, np.log(self.scale)))
+        return _Coordinates(edge, np.exp(scale), low, (high - low) / (columns - 1), columns)
+
+
+def _band(u: Array, stretched: Array, needs: Needs) -> tuple[Array, Array] | None:
+    """Return where the disk's inner and outer rim are in asinh(delta / w), shape (angles,), from u at such places,
+    shape (angles, distances); None where the image does not end."""
+    # A ray that is not known deep inside the shadow is of no disk.
+    u = np.where(np.isnan(u) & (stretched < 0.0), np.inf, u)
+    found = []
+    for level in (1.0 / needs.inner, 1.0 / needs.outer):
+        with np.errstate(invalid="ignore"):
+            above = u >= level
+        last = above.sum(axis=1) - 1
+        once = (above == (np.arange(u.shape[1]) <= last[:, None])).all()
+        if not once or last.min() < 0 or last.max() > u.shape[1] - 2:
+            return None
+        here, there, high, low = (
+            np.take_along_axis(each, (last + i)[:, None], axis=1)[:, 0] for each in (stretched, u) for i in (0, 1)
+        )
+        found.append(here + (there - here) * (high - level) / (high - low))
+    if not np.isfinite(found).all():
+        return None
+    return found[0], found[1]
+
+
 def _scale(u: Array, edge: Array, needs: Needs) -> Array:
-    """Return w for each of a few position angles from u at distances -SHARES and SHARES of the edge."""
+    """Return w for a few position angles from u at distances from the edge, the farthest first and last."""
     half = len(SHARES)
     inside, outside = u[:, :half][:, ::-1], u[:, half:]  # from the edge away
     change = np.fmax(np.abs(inside - inside[:, :1]), np.abs(outside - outside[:, :1]))
@@ -191,16 +359,32 @@ def _scale(u: Array, edge: Array, needs: Needs) -> Array:
     return scale
 
 
-def _between(scale: Array, angles: int) -> Array:
-    """Return w at more position angles, by few waves: smooth, as a coordinate has to be."""
-    waves = np.fft.rfft(np.log(scale))
+def _waves(values: Array, angles: int) -> Array:
+    """Return a coordinate's parameter at more position angles, by few waves: smooth, as it has to be."""
+    waves = np.fft.rfft(values)
     waves[MOST_WAVES:] = 0.0
-    smooth: Array = np.exp(np.fft.irfft(waves, angles) * (angles / len(scale)))
+    smooth: Array = np.fft.irfft(waves, angles) * (angles / len(values))
     return smooth
 
 
-def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array], Mask]:
-    """Return the channels for `RingTable`, NaN where nothing is known well enough, and where all of them are."""
+def _continue_inwards(values: Array, inside: Mask) -> None:
+    """Replace values of shape (angles, columns) beyond the inner rim, where rays end at the horizon and are not smooth
+    for long, by cubics through those next to it on the disk."""
+    columns = values.shape[1]
+    last = columns - 1 - np.argmax(inside[:, ::-1], axis=1)
+    rows = np.flatnonzero(inside.any(axis=1) & (last < columns - 4))
+    for depth in range(4):
+        column = last[rows] - depth
+        here = column >= 0
+        row, column = rows[here], column[here]
+        values[row, column] = sum(
+            weight * values[row, column + i] for i, weight in enumerate((4.0, -6.0, 4.0, -1.0), start=1)
+        )
+
+
+def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array], Mask, Mask]:
+    """Return the channels for `RingTable`, NaN where nothing is known well enough, where all of them are, and where u
+    is."""
     u, azimuth, slope = values
     angles = len(u)
     azimuth = np.nan_to_num(azimuth)  # rays that never cross: their u is not known either
@@ -211,20 +395,21 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array
     around = np.arange(-2, angles + 3)
     u, slope = u[around % angles], slope[around % angles]
     azimuth = azimuth[around % angles] + (around // angles)[:, None] * turn
+    for each in (azimuth, slope):
+        _continue_inwards(each, u >= 1.0 / needs.inner)
     off = np.maximum(1.0 / needs.outer - u, u - 1.0 / needs.inner)
     wide = around % angles
     away = grid.edge[wide, None] + grid.delta[wide]
     # How far a pixel reaches in units of the grid's steps, either way.
-    step = grid.range * (grid.s[1] - grid.s[0])
-    along = needs.pixel / (step[wide, None] * np.hypot(grid.scale[wide, None], grid.delta[wide]))
+    along = needs.pixel / (grid.step[wide, None] * np.hypot(grid.scale[wide, None], grid.delta[wide]))
     across = needs.pixel * angles / (2.0 * math.pi * np.maximum(np.sin(away), needs.pixel))
-    # What the coordinates lose between angles, in steps of s.
-    lost_edge, lost_scale, lost_step = (
+    # What the coordinates lose between angles, in columns.
+    lost_edge, lost_scale, lost_low, lost_step = (
         AROUND_ERROR * np.abs(np.diff(each[np.arange(-4, angles + 5) % angles], 4))[:, None]
-        for each in (grid.edge, grid.scale, step)
+        for each in (grid.edge, grid.scale, grid.low, grid.step)
     )
-    stray = along / needs.pixel * (lost_edge + lost_scale * np.abs(np.sinh(grid.range[wide, None] * grid.s)))
-    stray += lost_step / step[wide, None] * np.abs(grid.s / (grid.s[1] - grid.s[0]))
+    stray = along / needs.pixel * (lost_edge + lost_scale * np.abs(np.sinh(grid.stretched[wide])))
+    stray += (lost_low + lost_step * np.arange(grid.columns)) / grid.step[wide, None]
     good = np.ones(u.shape, dtype=bool)
     for each, small in ((u, needs.place_error / needs.outer), (azimuth, needs.place_error)):
         error = np.zeros_like(each)
@@ -234,8 +419,9 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array
             error = np.maximum(error, padded)
         change = np.gradient(each, axis=1), np.gradient(each, axis=0)
         error += stray * np.abs(change[0])
-        good &= error < np.maximum(needs.pixel_error * np.hypot(change[0] * along, change[1] * across), small)
+        good = good & (error < np.maximum(needs.pixel_error * np.hypot(change[0] * along, change[1] * across), small))
         if each is u:
+            placed = good
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
     # Next to rays that never cross, neighbours may have been unwrapped by different turns.
@@ -244,4 +430,5 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array
         edge = [(0, 1) if i == axis else (0, 0) for i in (0, 1)]
         good &= ~np.pad(torn, edge) & ~np.pad(torn, [each[::-1] for each in edge])
     known = good | far
-    return [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)], good[1:-1, 1:-1]
+    channels = [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)]
+    return channels, good[1:-1, 1:-1], placed[1:-1, 1:-1]

@@ -196,3 +196,10 @@ def lagrange_weights(part: Array, points: tuple[int, ...]) -> list[Array]:
             weight *= part - other
         weights.append(weight)
     return weights
+
+
+def nearest_turn(angle: Array) -> Array:
+    """Return angles brought to [-pi, pi] by whole turns."""
+    turn = 2.0 * math.pi
+    near: Array = angle - turn * np.round(angle * (1.0 / turn))
+    return near

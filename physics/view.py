@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .cameras import PanoramaCamera
 from .crossings import Crossings, LightAtDisk
 from .disk_tracer import disk_crossings
 from .observer import Observer
@@ -48,6 +49,8 @@ class View:
         self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
         self._camera_to_motion = self._camera_to_triad @ camera_triad(self._observer).T
         self.hole_to_world = np.array(parameters.hole_to_world)
+        self.is_panorama = isinstance(parameters.camera, PanoramaCamera)
+        """Whether the picture is of all directions."""
         self.phi = self._observer.phi
         """The camera's azimuth about the spin axis, radians."""
 

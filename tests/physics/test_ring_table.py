@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shots import shot
 
-from physics import Disk, Observer, bake
+from physics import Disk, Observer, PanoramaCamera, bake
 from physics.crossings import cross_plane
 from physics.disk_samples import PIXEL_ERROR, PLACE_ERROR
 from physics.mino import radial_polynomial
@@ -31,12 +31,12 @@ CAMERAS = {
 }
 
 
-def tables_of(parameters, rays=8000.0):
+def tables_of(parameters):
     inner, outer = parameters.disk.radii(parameters.spin)
     needs = Needs(
         inner, outer, 2e-5, parameters.pixel_angle, PIXEL_ERROR, PLACE_ERROR * parameters.interpolation
     )
-    return ring_tables(parameters.spin, parameters.observer(), {1: rays, 2: rays}, needs)
+    return ring_tables(parameters.spin, parameters.observer(), (1, 2), needs)
 
 
 def around_the_edge(view, count):
@@ -73,7 +73,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
         allowed = np.maximum(2.0 * PIXEL_ERROR * pixel, 2.0 * PLACE_ERROR * parameters.interpolation / outer)
         seen = known & on_disk
         assert (np.abs(u - exact) <= allowed)[seen].mean() > 0.999
-        assert np.abs(u - exact)[seen].max() < 5e-3
+        assert np.abs(u - exact)[seen].max() < 8e-3
         turn = np.abs((azimuth - traced.unwound[order] + math.pi) % (2.0 * math.pi) - math.pi)
         assert turn[seen].max() < 0.03
         assert np.median(turn[seen]) < 2e-4
@@ -85,16 +85,54 @@ def test_what_a_table_answers_is_what_rays_say(name):
 def test_tables_save_rays_and_leave_the_picture_as_it_is(monkeypatch):
     parameters = dataclasses.replace(shot(960, 540, spin=0.9, radius=20.0, fov=40.0), disk=Disk())
     with_tables = bake(parameters)
-    monkeypatch.setattr("physics.disk_samples.WORTHWHILE_RAYS", math.inf)
+    monkeypatch.setattr("physics.disk_samples.LEAST_SHADOW", math.inf)
     without = bake(parameters)
     assert with_tables.counts["disk_rays"] < 0.8 * without.counts["disk_rays"]
-    for one, other in zip(with_tables.disk_passes, without.disk_passes, strict=True):
+    for order, (one, other) in enumerate(zip(with_tables.disk_passes, without.disk_passes, strict=True)):
         covered = np.abs(one.coverage - other.coverage)
-        # Pixels at a rim of the thin images differ by what a pixel's own interpolation is allowed.
-        assert covered.max() < 0.2
-        assert np.count_nonzero(covered > 0.02) < 0.02 * np.count_nonzero(other.coverage)
         both = (one.coverage == 1.0) & (other.coverage == 1.0)
         assert np.median(np.abs(one.radius[both] / other.radius[both] - 1.0)) < 2e-4
+        if order < 2:
+            # Pixels at a rim differ by what a pixel's own interpolation is allowed.
+            assert covered.max() < 0.2
+            assert np.count_nonzero(covered > 0.02) < 0.02 * np.count_nonzero(other.coverage)
+        else:
+            # Nine places in a pixel know no better what a band thinner than the pixel covers.
+            assert covered.max() < 0.4
+            assert one.coverage.sum() == pytest.approx(other.coverage.sum(), rel=0.05)
+
+
+# Kinks beside the flat side of a fast hole's shadow, rims that are not parallel to the shadow's edge, and a panorama in
+# which tiles are large and hold a pole.
+ODD_CAMERAS = {
+    "next to the plane": shot(
+        320, 180, spin=0.9, radius=20.0, inclination=89.0, fov=40.0, disk=Disk(inner_radius=2.2, outer_radius=3.2)
+    ),
+    "beyond the plane": shot(
+        320, 180, spin=0.999, radius=12.0, inclination=90.5, fov=50.0, disk=Disk(outer_radius=4.0)
+    ),
+    "a wide disk, close up": shot(
+        96, 54, spin=0.999, radius=5.5, motion="fido", disk=Disk(inner_radius=13.0, outer_radius=260.0)
+    ),
+    "a small panorama": shot(
+        camera=PanoramaCamera(80, 40),
+        spin=-0.95,
+        radius=2.5,
+        inclination=20.0,
+        motion="fido",
+        disk=Disk(retrograde=True),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ODD_CAMERAS)
+def test_no_pixel_of_the_first_two_images_is_lost(name):
+    """Against a ray for each pixel, with which images of little more than a pixel come out within some percent."""
+    parameters = ODD_CAMERAS[name]
+    every = bake(dataclasses.replace(parameters, interpolation=0.0))
+    for one, other in zip(bake(parameters).disk_passes[:2], every.disk_passes[:2], strict=True):
+        assert np.abs(one.coverage - other.coverage).max() < 0.2
+        assert one.coverage.sum() == pytest.approx(other.coverage.sum(), rel=0.03, abs=0.1)
 
 
 def stepped(rays, times, steps=4000):

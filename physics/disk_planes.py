@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The planes of a disk's passes, and whole tiles written to them from Chebyshev coefficients, rims and all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .annulus import coverage, nearest_covered
+from .disk_samples import PHI, Matter, U
+from .painting import in_circle, wrapped
+from .rays import Array
+from .sky_table import nearest_turn
+from .tiles import TILE_SIDES, Tiles, at_pixels
+
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+Channels = NDArray[Any]
+"""Shape (channels, ...), in single precision for whole tiles."""
+
+# u is bent from this many times its value at the inner rim on.
+BENT_FROM = 2.0
+
+# How much steeper than at the places looked at a tile may be between them.
+STEEPER = 1.2
+
+# What follows u and the azimuth where the redshift itself is interpolated.
+G = 2
+
+
+class BentU:
+    """u = 1 / r as tiles interpolate it: nearly as it is on the disk, bounded beyond its inner rim.
+
+    u / (1 + (u / s)^2)^(1/2), s being `BENT_FROM` times u at the inner rim: deep in the hole, where u grows and rays
+    end, this is nearly constant, and a tile there is smooth.
+    """
+
+    def __init__(self, inner: float, outer: float) -> None:
+        self._bend = inner / BENT_FROM
+        low, high = self.bent(np.array([1.0 / outer, 1.0 / inner]))
+        self.low = float(low)
+        """At the outer rim."""
+        self.high = float(high)
+        """At the inner rim."""
+
+    def bent(self, u: Array) -> Array:
+        """Return u bent."""
+        bent: Array = u / np.sqrt(1.0 + (u * self._bend) ** 2)
+        return bent
+
+    def radius(self, bent: NDArray[Any]) -> NDArray[Any]:
+        """Return 1 / u of bent u > 0."""
+        radius: NDArray[Any] = np.sqrt(1.0 / (bent * bent) - self._bend * self._bend)
+        return radius
+
+    def matter(self, values: Channels) -> Matter:
+        """Return the matter at places given by bent u, azimuth and g."""
+        return self.radius(values[U]), in_circle(values[PHI]), values[G]
+
+
+class DiskPlanes:
+    """Radius, azimuth, g and coverage of each crossing, in the making."""
+
+    def __init__(self, crossings: int, width: int, height: int, bent: BentU) -> None:
+        self._width, self._height = width, height
+        self._bent = bent
+        self.planes = np.zeros((crossings, 4, height, width), np.float32)
+
+    def fill(
+        self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
+    ) -> None:
+        """Fill whole tiles from Chebyshev coefficients, shape (n, channels, points, points); the channels are bent u,
+        azimuth, and what else `matter` needs to know."""
+        # Single precision is what is written, and enough for sums of terms of order 1.
+        points = coefficients.shape[-1]
+        base = at_pixels(tiles.side, points)[0].astype(np.float32)
+        single = coefficients.astype(np.float32)
+        values: NDArray[Any] = base @ single @ base.T
+        u = values[:, U].reshape(len(tiles), -1)
+        low, high = u.min(axis=1), u.max(axis=1)
+        # Whole tiles inside need no coverage; half a pixel's way to a rim is less than the steepest step.
+        reach = _steepest(single[:, U], tiles.side)
+        whole = (low - reach > self._bent.low) & (high + reach < self._bent.high)
+        if whole.any():
+            self._write_tiles(order, tiles.select(whole), values[whole], None, matter)
+        rim = np.flatnonzero(~whole)
+        if len(rim):
+            self._fill_rim(order, tiles.select(rim), values[rim], reach[rim], matter)
+
+    def _fill_rim(
+        self,
+        order: int,
+        tiles: Tiles,
+        values: Channels,
+        reach: NDArray[Any],
+        matter: Callable[[Channels], Matter],
+    ) -> None:
+        """Write tiles with a rim in them from channels of shape (n, channels, side, side); `reach`: how much u changes
+        at the most from a pixel's centre to its corners, (n,)."""
+        u = values[:, U]
+        off = np.maximum(self._bent.low - u, u - self._bent.high)
+        covered = off < 0.0
+        tile, row, column = np.nonzero(np.abs(off) < reach[:, None, None])
+        inside = (tiles.column[tile] + column < self._width) & (tiles.row[tile] + row < self._height)
+        place = tile[inside], row[inside], column[inside]
+        by_channel = np.moveaxis(values, 1, 0)
+        right, below = slopes(by_channel, place)
+        here = by_channel[:, *place]
+        share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
+        covered[place] = share == 1.0
+        partly = (share > 0.0) & (share < 1.0)
+        right, below, here = right[:, partly], below[:, partly], here[:, partly]
+        met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
+        moved = here + right * x + below * y
+        moved[U] = met
+        np.clip(u, self._bent.low, self._bent.high, out=u)
+        self._write_tiles(order, tiles, values, covered, matter)
+        tile, row, column = (each[partly] for each in place)
+        where = (tiles.column[tile] + column, tiles.row[tile] + row)
+        self.write(order, where, matter(moved), share[partly])
+
+    def _write_tiles(
+        self, order: int, tiles: Tiles, values: NDArray[Any], covered: Mask | None, matter: Callable[[Channels], Matter]
+    ) -> None:
+        """Write tiles from channels of shape (n, channels, side, side), where they are wholly covered: None for all."""
+        radius, phi, g = matter(np.moveaxis(values, 1, 0))
+        share = np.ones_like(radius) if covered is None else covered
+        for plane, channel in zip(self.planes[order], (radius, phi, g, share), strict=True):
+            tiles.put(plane, channel, covered)
+
+    def write(
+        self,
+        order: int,
+        place: tuple[Index, Index],
+        matter: Matter,
+        share: Array,
+    ) -> None:
+        """Write pixels given by column and row, from radius, azimuth and g of shape (n,).
+
+        Light that cannot be, where a place was moved too far to a rim next to the horizon, leaves its pixel empty.
+        """
+        known = matter[2] > 0.0
+        columns, rows = (each[known] for each in place)
+        for plane, values in zip(self.planes[order], (*matter, share), strict=True):
+            plane[rows, columns] = values[known]
+
+
+def slopes(values: Array, place: tuple[Index, ...]) -> tuple[Array, Array]:
+    """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, side, side)
+    at some places; none where a neighbour is not known."""
+    tile, row, column = place
+    last = values.shape[-1] - 1
+    found = []
+    for down, right in ((0, 1), (1, 0)):
+        before = values[:, tile, np.maximum(row - down, 0), np.maximum(column - right, 0)]
+        after = values[:, tile, np.minimum(row + down, last), np.minimum(column + right, last)]
+        steps = 1.0 + ((row if down else column) % last != 0)  # one only at the tile's own edge
+        change = after - before
+        change[PHI] = nearest_turn(change[PHI])
+        found.append(np.nan_to_num(change / steps))
+    return found[0], found[1]
+
+
+def _steepest(coefficients: NDArray[Any], side: int) -> NDArray[Any]:
+    """Return how much tiles, given by Chebyshev coefficients of shape (n, points, points), change at the most from a
+    pixel's centre to its corners, shape (n,): from as many places as there are pixels in the smallest tiles."""
+    base, slope = (each.astype(np.float32) for each in at_pixels(TILE_SIDES[-1], coefficients.shape[-1]))
+    per_pixel = TILE_SIDES[-1] / side
+    change = np.abs(base @ coefficients @ slope.T) + np.abs(slope @ coefficients @ base.T)
+    steepest: NDArray[Any] = (0.5 * STEEPER * per_pixel) * change.max(axis=(1, 2))
+    return steepest
+
+
+def mean_matter(radius: Array, phi: Array, g: Array, weights: Array) -> Matter:
+    """Return the mean radius, azimuth and g over places of each pixel, shape (places, n), by weight.
+
+    A pixel that is partly covered, or by all of the disk at once, shows its mean: one place of it would twinkle from
+    pixel to pixel along a thin ring.
+    """
+    g = np.where(g > 0.0, g, 0.0)
+    weights = weights * (g > 0.0)
+    weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
+    mean = [(each * weights).sum(axis=0) for each in (1.0 / radius, np.cos(phi), np.sin(phi), g)]
+    azimuth = np.arctan2(mean[2], mean[1])
+    with np.errstate(divide="ignore"):
+        return 1.0 / mean[0], wrapped(azimuth + 2.0 * math.pi * (azimuth < 0.0)), mean[3]

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images of a disk that are bands around the shadow, pixel by pixel from their tables.
+
+From the third on, a disk's images are mostly thinner than a pixel. Across them all changes so fast that neither tiles
+nor a few places in a pixel tell what of it is covered. But a band's rims are smooth curves around the hole's direction
+that its table knows nearly everywhere (`ring_table`), and across a pixel the distance from them is all but linear. So
+the share of a pixel that is covered is right however thin the band is, and the pixel shows the mean across the part of
+the band in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .annulus import LEAST_COVERAGE, share_above
+from .quadrature import gauss_legendre
+from .rays import Array
+from .ring_table import RingTable
+from .sky_table import nearest_turn, position_angles
+from .tiles import TILE_SIDES, Tiles, tiles_of
+from .view import View
+
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+# Gauss's places and weights across the part of the band in a pixel, in units of its width.
+_PLACES, _WEIGHTS = gauss_legendre(3)
+PLACES, WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
+
+# Steps along a tile's side to the places that tell whether the band touches it; more in a panorama, where a tile may
+# hold a pole. Between them a rim bulges by less than this share of what its distances from them differ by, if they are
+# farther from the hole's direction than this many times what they are from each other.
+LOOKS, LOOKS_IN_PANORAMA = 1, 4
+BULGE, BESIDE_HOLE = 0.25, 2.0
+
+# Tiles worked through at a time: their pixels stay in the cache.
+GROUP = 64
+
+# What of a tile with a pixel more on each side is the tile.
+OWN = (slice(None), slice(1, -1), slice(1, -1))
+
+
+@dataclass(frozen=True)
+class RingPixels:
+    """Pixels that see a band, shape (n,)."""
+
+    column: Index
+    row: Index
+    share: Array
+    """How much of the pixel is covered."""
+    away: Array
+    """Angles from the hole's direction of places on the disk in the pixel, shape (k, n): one where it is wholly
+    covered, else those of `PLACES`."""
+    angle: Array
+    """Position angle."""
+
+
+class RingPainting:
+    """Which pixels see the band that is in a table."""
+
+    def __init__(self, view: View, table: RingTable, width: int, height: int) -> None:
+        self._view, self._table = view, table
+        self._width, self._height = width, height
+        looks = LOOKS_IN_PANORAMA if view.is_panorama else LOOKS
+        side, step = TILE_SIDES[-1], TILE_SIDES[-1] / looks
+        y, x = np.mgrid[0 : -(-height // side) * looks + 1, 0 : -(-width // side) * looks + 1] * step
+        x, y = np.minimum(x, width), np.minimum(y, height)
+        light = view.light(x.ravel(), y.ravel())
+        away, angle = position_angles(light)
+        (inner, _, outer, _), _ = table.band(angle)
+
+        def extremes(values: Array) -> tuple[Array, Array]:
+            """Return the smallest and largest value in each tile, shape (rows, columns)."""
+            window = (looks + 1, looks + 1)
+            each = np.lib.stride_tricks.sliding_window_view(values.reshape(x.shape), window)[::looks, ::looks]
+            return each.min(axis=(2, 3)), each.max(axis=(2, 3))
+
+        nearest, farthest = extremes(away)
+        first, _ = extremes(inner)
+        _, last = extremes(outer)
+        least, most = extremes(away - inner)
+        spans = [high - low for low, high in map(extremes, light)]
+        size = np.sqrt(sum(span * span for span in spans))
+        around = nearest < BESIDE_HOLE * size
+        slack = np.where(around, size, BULGE * (most - least))
+        self._nearest = np.where(around, inner.min(), first) - slack
+        self._farthest = np.where(around, outer.max(), last) + slack
+        if view.is_panorama:  # what lies between places is off by half of their distances at the most
+            nearest, farthest = nearest - size / looks, farthest + size / looks
+        self.touched: Mask = (farthest > self._nearest) & (nearest < self._farthest)
+        """Which of the smallest tiles the band may touch, shape (rows, columns)."""
+
+    def tiles(self) -> Tiles:
+        """Return the smallest tiles that the band may touch."""
+        return tiles_of(self._width, self._height, TILE_SIDES[-1]).select(self.touched.ravel())
+
+    def pixels(self, tiles: Tiles) -> Iterator[tuple[list[RingPixels], Index, Index]]:
+        """Yield pixels of some of the smallest tiles at a time, and columns and rows of those that are not known."""
+        for start in range(0, len(tiles), GROUP):
+            yield self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
+
+    def _pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
+        steps = np.arange(-1, tiles.side + 1) + 0.5  # a pixel more on each side, for slopes
+        x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
+        away, angle = (each.reshape(x.shape) for each in position_angles(self._view.light(x.ravel(), y.ravel())))
+        place = tiles.row // tiles.side, tiles.column // tiles.side
+        nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
+        near = (away[OWN] > nearest) & (away[OWN] < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
+        tile, row, column = np.nonzero(near)
+        row, column = row + 1, column + 1
+        here = (tile, row, column)
+        columns, rows = x[here].astype(np.intp), y[here].astype(np.intp)
+        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle[here])
+        right, left = (tile, row, column + 1), (tile, row, column - 1)
+        below, above = (tile, row + 1, column), (tile, row - 1, column)
+        gone = [0.5 * (away[one] - away[other]) for one, other in ((right, left), (below, above))]
+        turned = [0.5 * nearest_turn(angle[one] - angle[other]) for one, other in ((right, left), (below, above))]
+        away, angle = away[here], angle[here]
+
+        def within(rim: Array, slope: Array) -> tuple[Array, Array]:
+            """Return the share of each pixel that is nearer to the hole's direction than a rim, and half of how the
+            distance from the rim changes over a pixel."""
+            across, down = (slope * turn - step for step, turn in zip(gone, turned, strict=True))
+            return share_above(rim - away, across, down), 0.5 * np.hypot(across, down)
+
+        inside, _ = within(inner, inner_slope)
+        outside, half = within(outer, outer_slope)
+        share = np.where(known, outside - inside, 0.0)
+        whole = share > 1.0 - LEAST_COVERAGE
+        partly = (share > LEAST_COVERAGE) & ~whole
+        low, high = (np.clip(away + each, inner, outer)[partly] for each in (-half, half))
+        places = low + PLACES[:, None] * (high - low)
+        found = [
+            RingPixels(columns[whole], rows[whole], np.ones(np.count_nonzero(whole)), away[None, whole], angle[whole]),
+            RingPixels(columns[partly], rows[partly], share[partly], places, angle[partly]),
+        ]
+        return found, columns[~known], rows[~known]
