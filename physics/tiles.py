@@ -66,8 +66,8 @@ class Tiles:
         return self.column[:, None, None] + steps, self.row[:, None, None] + steps[:, None]
 
     def put(self, image: NDArray[Any], values: NDArray[Any], where: NDArray[np.bool_] | None = None) -> None:
-        """Write values, shape (n, side, side), to the tiles' places in an image, as far as they lie inside it; and
-        `where` it is true alone."""
+        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it and
+        `where`, shape (n, side, side), is true."""
         for i in range(len(self)):
             top, left = self.row[i], self.column[i]
             place = image[top : top + self.side, left : left + self.side]
