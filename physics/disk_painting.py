@@ -26,10 +26,10 @@ from .disk_planes import BentU, Channels, DiskPlanes, mean_matter
 from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
 from .painting import GROUP_PIXELS, pool
 from .rays import Array
-from .ring_painting import WEIGHTS, RingPainting, RingPixels
+from .ring_painting import WEIGHTS, RingPainting, RingPixels, TileSurvey
 from .shot import WarpMapParameters
 from .sky_table import nearest_turn
-from .tiles import TAIL, TAIL_SHARE, TILE_SIDES, Tiles, coefficients_of, sample_places, sides_for, tiles_of
+from .tiles import TAIL_SHARE, TILE_SIDES, Tiles, coefficients_of, sample_places, sides_for, tails_of, tiles_of
 from .tracer import BLOCK_SIZE
 from .view import View
 
@@ -92,10 +92,7 @@ class DiskPainting:
 
     def _adaptive(self) -> Generator[float, None, None]:
         self._samples.make_tables()
-        rings = {
-            order: RingPainting(self._view, table, self._width, self._height)
-            for order, table in self._samples.rings.items()
-        }
+        rings = self._rings()
         yield 0.1
         marked_x, marked_y = self._marked_places()
         sides = sides_for(self._width, self._height)
@@ -197,12 +194,10 @@ class DiskPainting:
 
     def _tails(self, coefficients: Array, side: int) -> tuple[Array, Array]:
         """Return what tells the error of tiles, by channel, shape (n, channels), and what it may be."""
-        size = np.abs(coefficients)
-        tail: Array = size[:, :, -TAIL:, :].sum(axis=(2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(2, 3))
-        pixel = np.hypot(size[:, :, 0, 1], size[:, :, 1, 0]) * (2.0 * PIXEL_ERROR / side)
+        pixel = np.hypot(coefficients[:, :, 0, 1], coefficients[:, :, 1, 0]) * (2.0 * PIXEL_ERROR / side)
         allowed = np.full(coefficients.shape[1], PLACE_ERROR * self._interpolation)
         allowed[U] /= self._outer
-        return tail, np.maximum(pixel, allowed)
+        return tails_of(coefficients), np.maximum(pixel, allowed)
 
     def _matter_coefficients(self, bent: Array, sampled: Array, side: int) -> tuple[Array, Mask]:
         """Return the coefficients of bent u, azimuth and g of those tiles that are good with them, and which these are;
@@ -230,6 +225,14 @@ class DiskPainting:
             self._planes.fill(order, tiles.select(part), coefficients[part], matter)
 
     # --- bands around the shadow ---------------------------------------------------------------------
+
+    def _rings(self) -> dict[int, RingPainting]:
+        """Return what paints those images that are bands, by order, counted from 0."""
+        tables = self._samples.rings
+        if not tables:
+            return {}
+        survey = TileSurvey(self._view, self._width, self._height)
+        return {order: RingPainting(survey, table) for order, table in tables.items()}
 
     def _paint_ring(self, order: int, ring: RingPainting, tiles: Tiles) -> Tiles:
         """Fill the smallest tiles from an image's table; return those that hold pixels it does not know."""

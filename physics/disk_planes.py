@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -185,6 +184,5 @@ def mean_matter(radius: Array, phi: Array, g: Array, weights: Array) -> Matter:
     weights = weights * (g > 0.0)
     weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
     mean = [(each * weights).sum(axis=0) for each in (1.0 / radius, np.cos(phi), np.sin(phi), g)]
-    azimuth = np.arctan2(mean[2], mean[1])
     with np.errstate(divide="ignore"):
-        return 1.0 / mean[0], wrapped(azimuth + 2.0 * math.pi * (azimuth < 0.0)), mean[3]
+        return 1.0 / mean[0], wrapped(np.arctan2(mean[2], mean[1])), mean[3]

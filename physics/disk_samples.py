@@ -13,7 +13,7 @@ from .metric import isco_radius
 from .orbiting_matter import circular_redshift, redshift_factor
 from .painting import in_circle
 from .radial_path import winding
-from .rays import Array, Rays
+from .rays import Array
 from .ring_table import REACH, Needs, RingTable, ring_tables
 from .shot import WarpMapParameters
 from .sky_table import position_angles
@@ -82,12 +82,12 @@ class DiskSamples:
             return self._trace_rays(x, y, wanted)
         values, lost = np.full((self._disk.crossings, self.channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
         asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
-        rays = self._view.rays(x[asked], y[asked])
+        energy, momentum = self._light(x[asked], y[asked])
         away, angle = position_angles(self._view.light(x[asked], y[asked]))
         left = wanted.copy()
         for order in self._tables:
             here = np.flatnonzero(wanted[order, asked])
-            u, *others = self._from_table(order, rays.select(here), away[here], angle[here])
+            u, *others = self._from_table(order, (energy[here], momentum[here]), away[here], angle[here])
             known = np.isfinite(u)
             here = asked[here[known]]
             left[order, here] = False
@@ -160,15 +160,18 @@ class DiskSamples:
     def at_ring(self, order: int, x: Array, y: Array, away: Array, angle: Array) -> Matter:
         """Return the matter at `position_angles` that pixel coordinates x, y are near to, shape (n,), from the table of
         an image; NaN where it has no answer."""
-        u, *others = self._from_table(order, self._view.rays(x, y), away, angle)
+        u, *others = self._from_table(order, self._light(x, y), away, angle)
         return self.matter(np.stack([np.clip(u, 1.0 / self._outer, 1.0 / self._inner), *others]))
 
-    def _from_table(self, order: int, rays: Rays, away: Array, angle: Array) -> list[Array]:
-        """Return the channels at position angles near those of rays, from the table of an image."""
-        place = self._tables[order].places(away, angle, 3 if self._falls else 2)
-        one_plus_z = rays.one_plus_z
-        found = [place[0], place[1], one_plus_z, rays.b * one_plus_z]
-        return [*found, place[2] * one_plus_z] if self._falls else found
+    def _light(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return energy and angular momentum of the light seen at pixel coordinates, for a camera energy of 1."""
+        rays = self._view.rays(x, y)
+        return rays.one_plus_z, rays.b * rays.one_plus_z
+
+    def _from_table(self, order: int, light: tuple[Array, Array], away: Array, angle: Array) -> list[Array]:
+        """Return the channels at position angles where the light is about this, from the table of an image."""
+        u, azimuth, *slope = self._tables[order].places(away, angle, 3 if self._falls else 2)
+        return [u, azimuth, *light, *(each * light[0] for each in slope)]
 
     def matter(self, values: NDArray[Any]) -> Matter:
         """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""

@@ -59,39 +59,50 @@ class RingPixels:
     """Position angle."""
 
 
+class TileSurvey:
+    """Where the hole is seen from places in the smallest tiles of a picture."""
+
+    def __init__(self, view: View, width: int, height: int) -> None:
+        self.view, self.width, self.height = view, width, height
+        self._looks = LOOKS_IN_PANORAMA if view.is_panorama else LOOKS
+        side, step = TILE_SIDES[-1], TILE_SIDES[-1] / self._looks
+        y, x = np.mgrid[0 : -(-height // side) * self._looks + 1, 0 : -(-width // side) * self._looks + 1] * step
+        light = view.light(np.minimum(x, width).ravel(), np.minimum(y, height).ravel())
+        self._shape = x.shape
+        self.away, self.angle = position_angles(light)
+        """Position angles of the places, shape (n,)."""
+        spans = [high - low for low, high in map(self.extremes, light)]
+        self.size: Array = np.sqrt(sum(span * span for span in spans))
+        """How far apart a tile's places are, radians, shape (rows, columns)."""
+        self.nearest, self.farthest = self.extremes(self.away)
+        """How near to the hole's direction, and how far from it, the places come, radians."""
+        self.between: Array | float = self.size / self._looks if view.is_panorama else 0.0
+        """By how much what lies between the places may come nearer, or farther."""
+
+    def extremes(self, values: Array) -> tuple[Array, Array]:
+        """Return the smallest and largest value in each tile, shape (rows, columns), from values at the places."""
+        window = (self._looks + 1, self._looks + 1)
+        tiles = np.lib.stride_tricks.sliding_window_view(values.reshape(self._shape), window)
+        tiles = tiles[:: self._looks, :: self._looks]
+        return tiles.min(axis=(2, 3)), tiles.max(axis=(2, 3))
+
+
 class RingPainting:
     """Which pixels see the band that is in a table."""
 
-    def __init__(self, view: View, table: RingTable, width: int, height: int) -> None:
-        self._view, self._table = view, table
-        self._width, self._height = width, height
-        looks = LOOKS_IN_PANORAMA if view.is_panorama else LOOKS
-        side, step = TILE_SIDES[-1], TILE_SIDES[-1] / looks
-        y, x = np.mgrid[0 : -(-height // side) * looks + 1, 0 : -(-width // side) * looks + 1] * step
-        x, y = np.minimum(x, width), np.minimum(y, height)
-        light = view.light(x.ravel(), y.ravel())
-        away, angle = position_angles(light)
-        (inner, _, outer, _), _ = table.band(angle)
-
-        def extremes(values: Array) -> tuple[Array, Array]:
-            """Return the smallest and largest value in each tile, shape (rows, columns)."""
-            window = (looks + 1, looks + 1)
-            each = np.lib.stride_tricks.sliding_window_view(values.reshape(x.shape), window)[::looks, ::looks]
-            return each.min(axis=(2, 3)), each.max(axis=(2, 3))
-
-        nearest, farthest = extremes(away)
-        first, _ = extremes(inner)
-        _, last = extremes(outer)
-        least, most = extremes(away - inner)
-        spans = [high - low for low, high in map(extremes, light)]
-        size = np.sqrt(sum(span * span for span in spans))
-        around = nearest < BESIDE_HOLE * size
-        slack = np.where(around, size, BULGE * (most - least))
+    def __init__(self, survey: TileSurvey, table: RingTable) -> None:
+        self._view, self._table = survey.view, table
+        self._width, self._height = survey.width, survey.height
+        (inner, _, outer, _), _ = table.band(survey.angle)
+        first, _ = survey.extremes(inner)
+        _, last = survey.extremes(outer)
+        least, most = survey.extremes(survey.away - inner)
+        around = survey.nearest < BESIDE_HOLE * survey.size
+        slack = np.where(around, survey.size, BULGE * (most - least))
         self._nearest = np.where(around, inner.min(), first) - slack
         self._farthest = np.where(around, outer.max(), last) + slack
-        if view.is_panorama:  # what lies between places is off by half of their distances at the most
-            nearest, farthest = nearest - size / looks, farthest + size / looks
-        self.touched: Mask = (farthest > self._nearest) & (nearest < self._farthest)
+        self.touched: Mask = survey.farthest + survey.between > self._nearest
+        self.touched &= survey.nearest - survey.between < self._farthest
         """Which of the smallest tiles the band may touch, shape (rows, columns)."""
 
     def tiles(self) -> Tiles:

@@ -233,20 +233,19 @@ def ring_tables(spin: float, observer: Observer, orders: Sequence[int], needs: N
     all rays have positive energy.
     """
     sky = _Sky(spin, Observer.fido(observer.r, observer.theta, observer.phi), max(orders) + 1, needs)
-    few = SCALE_ANGLES
-    edge = sky.edge(few)
+    few = sky.evenly(SCALE_ANGLES)
+    edge = sky.edge[few]
     distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
-    away = edge[:, None] + distances
-    (scouted,) = sky.cross([(away, np.arange(few), few, list(orders))])
+    (scouted,) = sky.cross([(edge[:, None] + distances, few, list(orders))])
     drafts = {order: _Draft.of(u, distances, edge, needs) for order, u in zip(orders, scouted[0], strict=True)}
     found: dict[int, Array] = {}
     tables: dict[int, RingTable] = {}
     waiting, angles = list(orders), ANGLES[0]
     while waiting:
-        # Every other row is there already, but for the first time.
-        rows = np.arange(angles) if not found else np.arange(1, angles, 2)
-        grids = {order: drafts[order].coordinates(sky.edge(angles)) for order in waiting}
-        asked = [((grids[order].edge[:, None] + grids[order].delta)[rows], rows, angles, [order]) for order in waiting]
+        index = sky.evenly(angles)
+        rows = slice(1, None, 2) if found else slice(None)  # every other row is there already, but for the first time
+        grids = {order: drafts[order].coordinates(sky.edge[index]) for order in waiting}
+        asked = [((grid.edge[:, None] + grid.delta)[rows], index[rows], [order]) for order, grid in grids.items()]
         for order, new in zip(waiting, sky.cross(asked), strict=True):
             values = np.empty((3, angles, grids[order].columns))
             values[:, rows] = new[:, 0]
@@ -271,21 +270,21 @@ class _Sky:
             np.linspace(0.0, 2.0 * math.pi, ANGLES[1], endpoint=False, dtype=np.float64)
         )
         error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
-        self._edge = edge_angles(spin, fido, self._aside, self._up, error)
+        self.edge = edge_angles(spin, fido, self._aside, self._up, error)
+        """How far the edge is from the hole's direction at the most position angles there are."""
 
-    def edge(self, angles: int) -> Array:
-        """Return how far the edge is from the hole's direction at so many position angles, a divisor of the most."""
-        return self._edge[:: ANGLES[1] // angles]
+    def evenly(self, angles: int) -> Index:
+        """Return the numbers of so many of these position angles at equal steps."""
+        return np.arange(0, ANGLES[1], ANGLES[1] // angles)
 
-    def cross(self, asked: list[tuple[Array, Index, int, list[int]]]) -> list[Array]:
+    def cross(self, asked: list[tuple[Array, Index, list[int]]]) -> list[Array]:
         """Return u, unwound azimuth and du / dlambda, shape (3, orders, rows, distances), for each that is asked for.
 
-        Asked for are angles from the hole's direction, shape (rows, distances); the rows' position angles, as numbers
-        out of how many; and the orders of the crossings.
+        Asked for are angles from the hole's direction, shape (rows, distances); the numbers of the rows' position
+        angles; and the orders of the crossings.
         """
         looking, wanted = [], []
-        for away, rows, angles, orders in asked:
-            index = rows * (ANGLES[1] // angles)
+        for away, index, orders in asked:
             looking.append(around_hole(away, self._aside[index, None], self._up[index, None]).reshape(-1, 3))
             here = np.zeros((self._count, away.size), dtype=bool)
             here[orders] = True
@@ -297,7 +296,7 @@ class _Sky:
         parts = np.split(values, ends[:-1], axis=2)
         return [
             part[:, orders].reshape(3, len(orders), *away.shape)
-            for part, (away, _, _, orders) in zip(parts, asked, strict=True)
+            for part, (away, _, orders) in zip(parts, asked, strict=True)
         ]
 
 

@@ -158,9 +158,16 @@ def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Arra
     """
     values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, -1)
     coefficients = _COEFFICIENTS @ np.moveaxis(values, -1, 1) @ _COEFFICIENTS.T
-    size = np.abs(coefficients)
-    rest = size[:, :, -TAIL:, :].sum(axis=(1, 2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(1, 2, 3))
+    rest = tails_of(coefficients).sum(axis=1)
     return coefficients, TAIL_SHARE * rest < tolerance  # NaN: False
+
+
+def tails_of(coefficients: Array) -> Array:
+    """Return the sum of the highest coefficients' sizes, shape (n, channels), of tiles of shape (n, channels, count,
+    count): `TAIL_SHARE` of it is about what interpolation may be wrong by."""
+    size = np.abs(coefficients)
+    tails: Array = size[:, :, -TAIL:, :].sum(axis=(2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(2, 3))
+    return tails
 
 
 def interpolate(coefficients: Array, side: int, rotation: Array) -> NDArray[np.float32]:
