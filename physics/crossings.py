@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where rays cross the equatorial plane on their way back from a camera: the first few crossings of each.
 
-The polar motion says when, in Mino time (`polar`); the radial motion says where it is then (`radial_path`). Rays of
+The polar motion says when, in Mino time (`polar`); the radial motion says where it is then (`radial_motion`). Rays of
 the sky and of the shadow alike are followed to their end, infinity or the horizon, also those inside the ergosphere
 whose energy at infinity is negative.
 """
@@ -17,7 +17,8 @@ from .metric import horizon_radius
 from .observer import Observer
 from .orbiting_matter import redshift_factor
 from .polar import PolarMotion
-from .radial_path import HORIZON_MARGIN, places_of_rays
+from .radial_motion import places_of_rays
+from .radial_path import HORIZON_MARGIN
 from .rays import Array, Rays, negative_energy_rays, rays_from_camera
 from .tracer import Fate
 from .trapped import comes_from_sky, find_barrier
@@ -77,7 +78,7 @@ class LightAtDisk:
 def cross_plane(
     rays: Rays, count: int, tolerance: float, beyond: bool = False, wanted: NDArray[np.bool_] | None = None
 ) -> Crossings:
-    """Return the first `count` crossings of rays of positive energy, without steps: `radial_path` and `polar`.
+    """Return the first `count` crossings of rays of positive energy, without steps: `radial_motion` and `polar`.
 
     Where `wanted`, shape (count, n), is given, the others are left NaN.
 
@@ -88,7 +89,7 @@ def cross_plane(
     times, azimuth = motion.plane_crossings(count, tolerance)
     if wanted is not None:
         times[~wanted] = np.nan
-    found = places_of_rays(rays, barrier, times, tolerance)
+    found = places_of_rays(rays, barrier, times, tolerance, beyond)
     if not beyond:
         with np.errstate(invalid="ignore"):
             ended = (found.u <= 0.0) | (found.u * (horizon_radius(rays.spin) * HORIZON_MARGIN) >= 1.0)

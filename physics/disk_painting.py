@@ -154,7 +154,8 @@ class DiskPainting:
     def _settle(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
         """Sample tiles, fill what they determine and strike it from `wanted`, whose rows `part` they are."""
         x, y = sample_places(tiles, DISK_POINTS)
-        values, lost = self._samples.at(x, y, np.repeat(wanted[part].T, DISK_POINTS**2, axis=1))
+        places = np.repeat(wanted[part].T, DISK_POINTS**2, axis=1)
+        values, lost = self._samples.at(x, y, places, smooth=False)
         values = values.reshape(*values.shape[:2], len(tiles), DISK_POINTS, DISK_POINTS)
         broken = lost.reshape(len(tiles), -1).any(axis=1)
         for order, sampled in enumerate(values):

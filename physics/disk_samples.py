@@ -71,12 +71,13 @@ class DiskSamples:
         self.rays = 0
         """How many rays were traced so far."""
 
-    def at(self, x: Array, y: Array, wanted: Mask) -> tuple[Array, Mask]:
+    def at(self, x: Array, y: Array, wanted: Mask, smooth: bool = True) -> tuple[Array, Mask]:
         """Return the channels, shape (crossings, channels, n), and which rays were given up, (n,).
 
         Only what is `wanted`, shape (crossings, n), means anything; the others' u is NaN.
 
-        u is finite everywhere: rays that never cross count as far beyond their end.
+        u is finite everywhere: rays that never cross count as far beyond their end, and where it need not be `smooth`,
+        so does all that is known to be beyond an image around the shadow.
         """
         if not self._tables:
             return self._trace_rays(x, y, wanted)
@@ -88,7 +89,7 @@ class DiskSamples:
         for order in self._tables:
             here = np.flatnonzero(wanted[order, asked])
             u, *others = self._from_table(order, (energy[here], momentum[here]), away[here], angle[here])
-            known = np.isfinite(u)
+            known = np.isfinite(u) if smooth else ~np.isnan(u)
             here = asked[here[known]]
             left[order, here] = False
             values[order, :, here] = np.stack([self._clipped(u), *others], axis=1)[known]

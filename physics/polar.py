@@ -41,8 +41,10 @@ EXTRA_POWERS = 2
 # A height above the equatorial plane, or a slope towards it, of less than this is rounding.
 IN_PLANE = 1e-15
 
-# For the few rays without a short series: enough for singularities 1e-8 from the path at the tightest tolerance.
-_PLANE_RULE = gauss_legendre(64)
+# For the few rays without a short series: nodes of a quadrature that leave 1e-13 and 1e-7, with singularities 1e-8 from
+# the path, and the tightest tolerance that the fewer are used for.
+_PLANE_RULE, _SMALL_PLANE_RULE = gauss_legendre(32), gauss_legendre(16)
+SMALL_RULE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -201,7 +203,8 @@ class PolarMotion:
         part, a2 = self.select(chosen), self.spin * self.spin
         swing = 2.0 * part.mean * part.ellipticity  # a^2 w_+
         near = np.sqrt(part.base / swing)
-        nodes, weights = (each[:, None] for each in _PLANE_RULE)
+        rule = _SMALL_PLANE_RULE if tolerance >= SMALL_RULE_TOLERANCE else _PLANE_RULE
+        nodes, weights = (each[:, None] for each in rule)
 
         def integrals(angle: Array) -> Array:
             half = 0.5 * np.arcsinh(angle / near)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a ray is at given Mino times: u = 1 / r and psi along the whole way to infinity or to the horizon.
+"""Where a ray is at given Mino times, by series: u = 1 / r and psi along the whole way to infinity or to the horizon.
+
+For tight tolerances, and for what the closed form of `radial_motion` leaves open.
 
 The radial coordinate x of `mino` grows along the ray and dx / dlambda = x' is known, so lambda(x) and psi(x) are
 integrals of known functions, smooth on the way. Both integrands are sampled at Chebyshev points; their Chebyshev
@@ -214,7 +216,7 @@ def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPat
                 start = -start
                 rates[1::2] *= -1.0
             near = np.sqrt(np.where(rates[2] > 0.0, rates[0] / rates[2], np.inf))
-        u_end = -BEYOND * root if sign < 0.0 else _beyond_horizon(a)
+        u_end = -BEYOND * root if sign < 0.0 else beyond_horizon(a)
         end = sign * (u_end / unit - 1.0)
         far = 1.0 + root / unit
         if squared:
@@ -222,7 +224,7 @@ def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPat
     return RadialPath(a, squared, sign, rays.b, drag, rates, unit, start, end, far, near, pace)
 
 
-def _beyond_horizon(spin: float) -> float:
+def beyond_horizon(spin: float) -> float:
     """Return u where paths through the horizon end, before the inner one."""
     outer = 1.0 / horizon_radius(spin)
     square = spin * spin

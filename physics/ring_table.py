@@ -132,7 +132,10 @@ class RingTable:
         known = rims[0].known & rims[1].known
         self._band = [each[around] for rim in reversed(rims) for each in (rim.away, rim.slope)]
         self._band_known = np.lib.stride_tricks.sliding_window_view(known[around], len(AROUND)).all(axis=1)
-        within = (u[:, -1] < self._rims[0]).all() and not (u[:, 0] < self._rims[1]).any()
+        # A ray that is not known deep inside the shadow is of no disk.
+        ends_inside = not (u[:, :2] < self._rims[1]).any()
+        ends_outside = bool((u[:, -2:] < self._rims[0]).all())
+        within = ends_inside and ends_outside
         self.confined = bool(within and np.isfinite(self._band).all() and known.mean() > ENOUGH_ROWS)
         """Whether all of the image is in the table: it is a band around the shadow."""
 
@@ -142,10 +145,14 @@ class RingTable:
         return self._angles * (self._columns + 2)
 
     def places(self, away: Array, angle: Array, channels: int) -> Array:
-        """Return the first few channels at `position_angles`, shape (channels, n); NaN: no answer."""
+        """Return the first few channels at `position_angles`, shape (channels, n).
+
+        u is NaN where there is no answer, and infinite beyond the ends of an image that is `confined`.
+        """
         row, across, (edge, scale, low, step) = self._around(angle, self._grid)
         place: Array = (np.arcsinh((away - edge) / scale) - low) / step + AROUND[0]
-        inside = (place >= 0.0) & (place < self._columns - len(AROUND) + 1.0)
+        before = place < 0.0
+        inside = ~before & (place < self._columns - len(AROUND) + 1.0)
         place = np.where(inside, place, 0.0)
         column = place.astype(np.intp)
         part = place - column
@@ -159,7 +166,8 @@ class RingTable:
                     component += both * values.take(index)
         unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
         unknown &= (result[0] >= self._rims[0]) & (result[0] <= self._rims[1])
-        result[:, unknown | ~inside] = np.nan
+        result[0, unknown] = np.nan
+        result[0, ~inside] = np.where(before[~inside], np.inf, -np.inf) if self.confined else np.nan
         return result
 
     def band(self, angle: Array) -> tuple[list[Array], Mask]:

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a ray is at given Mino times, in closed form: u = 1 / r by elliptic functions, psi by a few of their values.
+
+u obeys u'^2 = U(u) (`mino`), which `weierstrass` solves for any time at once: from the camera to the middle of the time
+asked for, and from there to the nodes of Gauss's and Legendre's quadrature on both sides of it, where psi' is wanted.
+That is smooth in Mino time, unlike in r: six nodes serve most rays. Its highest coefficients tell the error, as in
+`radial_path`, whose conventions are also these: psi without its winding, and paths that go on beyond infinity and
+through the horizon for a while. What is not determined, and rays that start inside of what turns them, are left to
+that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mino import radial_polynomial
+from .quadrature import gauss_legendre, negative_root
+from .radial_path import BEYOND, TAIL, Places, beyond_horizon, winding
+from .radial_path import places_of_rays as places_by_series
+from .rays import Array, Rays
+from .trapped import Barrier
+from .weierstrass import QuarticMotion, Weierstrass
+
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+# Tightest tolerance that is served: where rays part next to the critical curve rounding costs up to 1e-7 of u.
+TIGHTEST = 3e-7
+
+# Numbers of nodes, and the longest times that they are used for (`Weierstrass.rate`): half a turn, one and a half. Last
+# what the others are not enough for.
+NODE_COUNTS = (6, 12, 24)
+LONGEST_TIMES = (1.0, 2.6)
+
+# Fewer pairs than this are better served by more nodes than by a call of their own.
+FEW = 800
+
+# What the highest coefficients may amount to, squared, in units of the tolerance: the error was found to be a hundredth
+# of that square, as Gauss's and Legendre's rule is good for polynomials of twice the degree.
+TAIL_SQUARE = 50.0
+
+# No ray is followed longer than this for the first crossing that may be asked for, and for each more, in the same
+# units.
+LONGEST_FIRST, LONGEST_MORE = 1.5, 0.9
+
+# Pairs of rays and times worked through at once: what is known of their nodes stays in the cache.
+CHUNK = 4096
+
+# Newton's rounds to the end of a path, and the share of the tolerance's square root that the last may change by.
+NEWTON_ROUNDS = 8
+LAST_CHANGE = 1e-3
+# The least share of the way between two nodes that is left before the end, to start with.
+LEAST_WAY = 1e-6
+# A round shortens the way to this share of it at the most.
+LEAST_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """Gauss's and Legendre's rule over a time, by nodes on both sides of its middle."""
+
+    sides: Array
+    """Distances from the middle, first 1, the end itself, in units of half of the time; shape (1 + k,)."""
+    weights: Array
+    """For the values at + and then at - sides[1:], shape (2 k,); they sum up to 1."""
+    to_tail: Array
+    """To the highest Legendre coefficients, shape (`TAIL`, 2 k)."""
+    in_order: Index
+    """Of the nodes' values, followed by those in the middle and at the end, in time; shape (2 k + 2,)."""
+    times: Array
+    """These times in order, 0 before them; shape (2 k + 3,)."""
+
+    @classmethod
+    def of(cls, count: int) -> _Rule:
+        """Return the rule of an even number of nodes."""
+        nodes, weights = gauss_legendre(count)
+        polynomials = [np.ones(count), nodes]
+        for n in range(1, count - 1):
+            polynomials.append(((2 * n + 1) * nodes * polynomials[n] - n * polynomials[n - 1]) / (n + 1))
+        to_series = (np.arange(count)[:, None] + 0.5) * np.stack(polynomials) * weights
+        half = count // 2
+        both = np.concatenate([np.arange(half, count), np.arange(half)[::-1]])
+        times = 0.5 * (1.0 + np.concatenate([nodes[both], [0.0, 1.0]]))
+        in_order = np.argsort(times)
+        return cls(
+            np.concatenate([[1.0], nodes[half:]])[:, None],
+            0.5 * weights[both],
+            to_series[-TAIL:][:, both],
+            in_order,
+            np.concatenate([[0.0], times[in_order]]),
+        )
+
+
+_RULES = {count: _Rule.of(count) for count in NODE_COUNTS}
+
+
+@dataclass(frozen=True)
+class _Paths:
+    """Rays from one camera and a time for each; arrays of shape (n,)."""
+
+    spin: float
+    start: float
+    """u at the camera."""
+    function: Weierstrass
+    constants: Array
+    """The properties that follow, shape (9, n)."""
+    time: Array
+
+    @classmethod
+    def of(cls, rays: Rays, barrier: Barrier) -> _Paths:
+        """Return the paths of rays, for no time yet."""
+        spin, start = rays.spin, 1.0 / rays.observer.r
+        constants = np.empty((9, len(rays)))
+        with np.errstate(all="ignore"):  # impossible rays are not asked for
+            constants[:3] = quartic = radial_polynomial(rays)
+            constants[3] = rays.radial * (start * start)
+            constants[4] = rays.b
+            constants[5] = rays.carter + spin * (spin - 2.0 * rays.b)
+            constants[6] = ~barrier.blocks & (rays.radial >= 0.0)
+            constants[7] = -BEYOND * negative_root(rays)
+            constants[8] = np.sqrt(np.maximum(rays.carter + spin * spin, 0.0))
+            return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
+
+    @property
+    def quartic(self) -> Array:
+        """c_2, c_3, c_4 of U, shape (3, n)."""
+        quartic: Array = self.constants[:3]
+        return quartic
+
+    @property
+    def slope(self) -> Array:
+        """du / dlambda at the camera."""
+        slope: Array = self.constants[3]
+        return slope
+
+    @property
+    def b(self) -> Array:
+        """p_phi."""
+        b: Array = self.constants[4]
+        return b
+
+    @property
+    def drag(self) -> Array:
+        """q + (b - a)^2."""
+        drag: Array = self.constants[5]
+        return drag
+
+    @property
+    def inward(self) -> Mask:
+        """Whether the ray falls straight in: it ends at the horizon, the others at infinity."""
+        inward: Mask = self.constants[6] > 0.0
+        return inward
+
+    @property
+    def lowest(self) -> Array:
+        """u beyond infinity where rays stay."""
+        lowest: Array = self.constants[7]
+        return lowest
+
+    @property
+    def highest(self) -> float:
+        """u inside the horizon where paths end."""
+        return beyond_horizon(self.spin)
+
+    @property
+    def pace(self) -> Array:
+        """How fast the ray's direction turns, radians per Mino time."""
+        pace: Array = self.constants[8]
+        return pace
+
+    def for_times(self, chosen: Index, time: Array) -> _Paths:
+        """Return the paths of the chosen rays, for these times."""
+        return _Paths(
+            self.spin, self.start, self.function.select(chosen), self.constants.take(chosen, axis=1), time
+        )
+
+    def lasting(self, time: Array) -> _Paths:
+        """Return the same paths for other times."""
+        return replace(self, time=time)
+
+    def motion(self) -> QuarticMotion:
+        """Return u from the camera on."""
+        return QuarticMotion(self.function, self.quartic, np.full_like(self.slope, self.start), self.slope)
+
+    def nodes(self, rule: _Rule) -> tuple[Array, Array]:
+        """Return u and du / dlambda at a rule's nodes, in the middle and at the end, shape (2 k + 2, n)."""
+        value, slope = self.function.at((0.5 * self.time) * rule.sides)
+        middle = self.motion().after(value[0], slope[0])
+        after, before = QuarticMotion(self.function, self.quartic, *middle).around(value, slope)
+        u, rate = (
+            np.concatenate([later[1:], earlier[1:], centre[None], later[:1]])
+            for later, earlier, centre in zip(after, before, middle, strict=True)
+        )
+        return u, rate
+
+    def turn_rate(self, u: Array, slope: Array) -> Array:
+        """Return dpsi / dlambda without the winding W(u), regular at the horizon on the way in (`radial_path`)."""
+        a = self.spin
+        square = u * u
+        p = square * (a * (a - self.b))
+        p += 1.0
+        p += np.abs(slope)
+        square *= self.drag
+        # 1 - 2 u + a^2 u^2
+        delta = u * (a * a)
+        delta -= 2.0
+        delta *= u
+        delta += 1.0
+        inward = slope > 0.0
+        rate: Array = np.where(inward, square, p)
+        rate /= np.where(inward, p, delta)
+        rate *= -a
+        rate += a
+        return rate
+
+    def unwound(self, rule: _Rule, u: Array, slope: Array) -> tuple[Array, Array]:
+        """Return psi - W(u) at the end, from `nodes`, and what tells its error."""
+        if self.spin == 0.0:
+            return np.zeros_like(self.time), np.zeros_like(self.time)
+        rate = self.turn_rate(u[:-2], slope[:-2])
+        gone = float(winding(self.spin, np.array([self.start]))[0])
+        return self.time * (rule.weights @ rate) - gone, self.time * np.abs(rule.to_tail @ rate).sum(axis=0)
+
+
+
+def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float, beyond: bool = True) -> Places:
+    """Return where rays of any kind are at Mino times of shape (k, n), NaN for none, with an error of `tolerance`
+    radians; see `radial_path.places`. Unless asked for beyond the rays' ends, u there says no more than that it is."""
+    if tolerance < TIGHTEST:
+        return places_by_series(rays, barrier, times, tolerance)
+    found = Places.empty(*times.shape)
+    every = _Paths.of(rays, barrier)
+    with np.errstate(invalid="ignore"):
+        span = times * every.function.rate
+        span[:, barrier.blocks & (rays.observer.r <= barrier.radius)] = np.nan
+    longest = (LONGEST_FIRST + LONGEST_MORE * (len(times) - 1)) / every.function.rate
+    known = np.zeros(times.shape, dtype=bool)
+    tried = np.isnan(span)
+    for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
+        order, ray = np.nonzero((span <= most) & ~tried if count != NODE_COUNTS[-1] else np.isfinite(span) & ~known)
+        if len(ray) < FEW and count != NODE_COUNTS[-1]:
+            continue
+        tried[order, ray] = True
+        for start in range(0, len(ray), CHUNK):
+            place = order[start : start + CHUNK], ray[start : start + CHUNK]
+            time = times[place]
+            with np.errstate(all="ignore"):  # beyond a path's end there may be poles; what is not finite is not known
+                followed = every.for_times(place[1], np.minimum(time, longest[place[1]]))
+                found.u[place], found.u_slope[place], found.unwound[place], known[place] = _places(
+                    followed, time, _RULES[count], tolerance, beyond
+                )
+    found.resolved[:] = (known | np.isnan(times)).all(axis=0)
+    left = np.flatnonzero(~found.resolved)
+    if len(left):
+        found.put(left, places_by_series(rays.select(left), barrier.select(left), times[:, left], tolerance))
+    return found
+
+
+def _places(
+    paths: _Paths, time: Array, rule: _Rule, tolerance: float, beyond: bool
+) -> tuple[Array, Array, Array, Mask]:
+    """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, and where known."""
+    u, slope = paths.nodes(rule)
+    unwound, error = paths.unwound(rule, u, slope)
+    place, rate = u[-1], slope[-1]
+    known = time == paths.time
+    # On to U's negative root and back: what has been beyond infinity stays there.
+    gone = (u <= 0.0).any(axis=0) & ~paths.inward
+    known |= gone
+    back = gone & ((place > 0.0) | (rate >= 0.0) & (place > paths.lowest))
+    place[back], rate[back] = paths.lowest[back], 0.0
+    left = paths.inward & ~((u > 0.0) & (u < paths.highest) & (slope > 0.0))
+    index = np.flatnonzero(left.any(axis=0))
+    if not beyond:
+        known[index], place[index], unwound[index], error[index] = True, paths.highest, 0.0, 0.0
+    elif len(index):
+        ends, met = _ends(paths.for_times(index, paths.time[index]), rule, u, slope, left, index, tolerance)
+        known[index] = met
+        further = time[index] - ends.time
+        place[index], rate[index], unwound[index], error[index] = _beyond_end(ends, further, rule)
+    known &= (error * error <= TAIL_SQUARE * tolerance) & np.isfinite(place) & np.isfinite(unwound)
+    return place, rate, unwound, known
+
+
+def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, Array, Array]:
+    """Return u, du / dlambda, psi - W(u) and what tells its error so much later than the end of paths into the hole:
+    along a parabola, and turning on at the last rate."""
+    u, slope = paths.nodes(rule)
+    unwound, error = paths.unwound(rule, u, slope)
+    end, steep = u[-1], slope[-1]
+    bend = QuarticMotion(paths.function, paths.quartic, end, steep).bend
+    late = np.where(bend < 0.0, np.minimum(late, -steep / bend), late)  # beyond its vertex u would come back
+    if paths.spin != 0.0:
+        unwound += late * paths.turn_rate(end, steep)
+    return end + late * (steep + 0.5 * late * bend), steep + late * bend, unwound, error
+
+
+def _ends(
+    paths: _Paths, rule: _Rule, u: Array, slope: Array, left: Mask, index: Index, tolerance: float
+) -> tuple[_Paths, Mask]:
+    """Return paths into the hole, shape (n,), up to their ends, and for which of them that is well known.
+
+    `u`, `slope`: at the nodes of more paths, of which these have the numbers `index`; `left`: where those are no
+    longer on their way. Newton's method for 1 / u^(1/2), which is nearly linear, from the last node before the end.
+    """
+    in_order = rule.in_order[:, None], index
+    first = left[in_order].argmax(axis=0)
+    since = rule.times[first] * paths.time
+    gap = rule.times[first + 1] * paths.time - since
+    before = rule.in_order[first - 1], index
+    from_camera = first == 0
+    start = np.where(from_camera, paths.start, u[before])
+    motion = QuarticMotion(paths.function, paths.quartic, start, np.where(from_camera, paths.slope, slope[before]))
+    goal, enough = 1.0 / math.sqrt(paths.highest), LAST_CHANGE * math.sqrt(tolerance)
+
+    def ahead(u: Array, slope: Array) -> Array:
+        root = 1.0 / np.sqrt(u)
+        return 2.0 * (root - goal) / (root**3 * slope)
+
+    way = np.clip(ahead(start, motion.slope), LEAST_WAY * gap, gap)
+    for _ in range(NEWTON_ROUNDS):
+        here, steep = motion.after(*paths.function.at(way))
+        # Beyond the pole, back.
+        following = np.clip(np.where(here > 0.0, way + ahead(here, steep), 0.0), LEAST_SHARE * way, gap)
+        change, way = np.abs(following - way) * paths.pace, following
+        if not (change > enough).any():
+            break
+    return paths.lasting(since + way), change <= enough
