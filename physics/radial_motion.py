@@ -23,7 +23,7 @@ from .radial_path import BEYOND, TAIL, Places, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
 from .rays import Array, Rays
 from .trapped import Barrier
-from .weierstrass import QuarticMotion, Weierstrass
+from .weierstrass import QuarticMotion, Weierstrass, acceleration
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -50,9 +50,9 @@ LONGEST_FIRST, LONGEST_MORE = 1.5, 0.9
 # Pairs of rays and times worked through at once: what is known of their nodes stays in the cache.
 CHUNK = 4096
 
-# Newton's rounds to the end of a path, and the share of the tolerance's square root that the last may change by.
-NEWTON_ROUNDS = 8
-LAST_CHANGE = 1e-3
+# Rounds to the end of a path at the most, and the share of the tolerance's cube root that the last may change by.
+END_ROUNDS = 8
+LAST_CHANGE = 0.1
 # The least share of the way between two nodes that is left before the end, to start with.
 LEAST_WAY = 1e-6
 # A round shortens the way to this share of it at the most.
@@ -292,7 +292,7 @@ def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, 
     u, slope = paths.nodes(rule)
     unwound, error = paths.unwound(rule, u, slope)
     end, steep = u[-1], slope[-1]
-    bend = QuarticMotion(paths.function, paths.quartic, end, steep).bend
+    bend = acceleration(paths.quartic, end)
     late = np.where(bend < 0.0, np.minimum(late, -steep / bend), late)  # beyond its vertex u would come back
     if paths.spin != 0.0:
         unwound += late * paths.turn_rate(end, steep)
@@ -305,7 +305,7 @@ def _ends(
     """Return paths into the hole, shape (n,), up to their ends, and for which of them that is well known.
 
     `u`, `slope`: at the nodes of more paths, of which these have the numbers `index`; `left`: where those are no
-    longer on their way. Newton's method for 1 / u^(1/2), which is nearly linear, from the last node before the end.
+    longer on their way. Chebyshev's method, Newton's of third order, for 1 / u^(1/2), which is nearly linear, from the last node before.
     """
     in_order = rule.in_order[:, None], index
     first = left[in_order].argmax(axis=0)
@@ -315,17 +315,22 @@ def _ends(
     from_camera = first == 0
     start = np.where(from_camera, paths.start, u[before])
     motion = QuarticMotion(paths.function, paths.quartic, start, np.where(from_camera, paths.slope, slope[before]))
-    goal, enough = 1.0 / math.sqrt(paths.highest), LAST_CHANGE * math.sqrt(tolerance)
+    goal, enough = 1.0 / math.sqrt(paths.highest), LAST_CHANGE * tolerance ** (1.0 / 3.0)
 
-    def ahead(u: Array, slope: Array) -> Array:
+    def ahead(u: Array, slope: Array, bend: Array) -> Array:
+        """Return Chebyshev's step, of third order."""
         root = 1.0 / np.sqrt(u)
-        return 2.0 * (root - goal) / (root**3 * slope)
+        inverse = 1.0 / slope
+        step = 2.0 * (1.0 - goal / root) * u * inverse
+        curved: Array = step * (1.0 + step * (0.75 * slope / u - 0.5 * bend * inverse))
+        return curved
 
-    way = np.clip(ahead(start, motion.slope), LEAST_WAY * gap, gap)
-    for _ in range(NEWTON_ROUNDS):
+    way = np.clip(ahead(start, motion.slope, motion.bend), LEAST_WAY * gap, gap)
+    for _ in range(END_ROUNDS):
         here, steep = motion.after(*paths.function.at(way))
         # Beyond the pole, back.
-        following = np.clip(np.where(here > 0.0, way + ahead(here, steep), 0.0), LEAST_SHARE * way, gap)
+        following = np.where(here > 0.0, way + ahead(here, steep, acceleration(paths.quartic, here)), 0.0)
+        following = np.clip(following, LEAST_SHARE * way, gap)
         change, way = np.abs(following - way) * paths.pace, following
         if not (change > enough).any():
             break

@@ -104,6 +104,13 @@ class Weierstrass:
         return bend
 
 
+def acceleration(quartic: Array, u: Array) -> Array:
+    """Return u'' = U'(u) / 2, shape (n,); `quartic`: c_2, c_3, c_4, shape (3, n)."""
+    c2, c3, c4 = quartic
+    bend: Array = u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u))
+    return bend
+
+
 class QuarticMotion:
     """u over time for many quartics and starts, shape (n,)."""
 
@@ -114,7 +121,7 @@ class QuarticMotion:
         self.slope = slope
         """u' at the start."""
         square = slope * slope
-        self.bend: Array = u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u))
+        self.bend = acceleration(quartic, u)
         """u'' at the start."""
         self._shift = (c2 + u * (3.0 * c3 + 6.0 * c4 * u)) / 12.0
         self._third = square * (0.25 * c3 + c4 * u)
