@@ -98,13 +98,14 @@ class DiskTracing:
             finer &= open_here
             with np.errstate(invalid="ignore"):
                 share = coverage(here[U], across, down, self._low, self._high)
-                seen = np.nonzero((share > 0.0) & ~finer & open_here)
-            u, x, y = nearest_covered(here[U][seen], across[seen], down[seen], self._low, self._high)
+                seen = np.flatnonzero((share > 0.0) & ~finer & open_here)
+            moved = here.reshape(len(here), -1).take(seen, axis=1)
+            u, x, y = nearest_covered(moved[U], across.take(seen), down.take(seen), self._low, self._high)
             right, below = slopes(here, seen)
-            moved = here[:, seen[0], seen[1], seen[2]] + right * x + below * y
+            moved += right * x + below * y
             moved[U] = u
-            place = (columns[chosen][seen], rows[chosen][seen])
-            self._planes.write(order, place, self._samples.matter(moved), share[seen])
+            place = (columns[chosen].take(seen), rows[chosen].take(seen))
+            self._planes.write(order, place, self._samples.matter(moved), share.take(seen))
             self._divide(order, columns[chosen][finer], rows[chosen][finer], here[:, finer])
 
     def _needs_finer(self, u: Array, across: Array, down: Array) -> Mask:
