@@ -118,6 +118,7 @@ class DiskPainting:
                 wanted = np.repeat(wanted, 4, axis=0)
                 inside = (waiting.column < self._width) & (waiting.row < self._height)
                 waiting, wanted = waiting.select(inside), wanted[inside]
+        self._planes.fill_rims()
         for order, ring in rings.items():
             tiles = ring.tiles() if order >= FIRST_THIN else waiting.select(wanted[:, order])
             wanted[:, order] = False

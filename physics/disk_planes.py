@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -20,6 +21,7 @@ from .tiles import TILE_SIDES, Tiles, at_pixels
 Index = NDArray[np.intp]
 Channels = NDArray[Any]
 """Shape (channels, ...), in single precision for whole tiles."""
+MatterOf = Callable[[Channels], Matter]
 
 # u is bent from this many times its value at the inner rim on.
 BENT_FROM = 2.0
@@ -68,12 +70,11 @@ class DiskPlanes:
         self._width, self._height = width, height
         self._bent = bent
         self.planes = np.zeros((crossings, 4, height, width), np.float32)
+        self._rims: defaultdict[tuple[int, MatterOf], list[tuple[Index, Channels, Array, Array]]] = defaultdict(list)
 
-    def fill(
-        self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
-    ) -> None:
-        """Fill whole tiles from Chebyshev coefficients, shape (n, channels, points, points); the channels are bent u,
-        azimuth, and what else `matter` needs to know."""
+    def fill(self, order: int, tiles: Tiles, coefficients: Array, matter: MatterOf) -> None:
+        """Fill tiles from Chebyshev coefficients, shape (n, channels, points, points), but for pixels next to a rim,
+        which are left to `fill_rims`; the channels are bent u, azimuth, and what else `matter` needs to know."""
         # Single precision is what is written, and enough for sums of terms of order 1.
         single = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0), dtype=np.float32)
         base, _ = _polynomials(tiles.side, single.shape[-1])
@@ -89,20 +90,13 @@ class DiskPlanes:
         if len(rim):
             self._fill_rim(order, tiles.select(rim), values[:, rim], reach[rim], matter)
 
-    def _fill_whole(
-        self, order: int, tiles: Tiles, values: Channels, matter: Callable[[Channels], Matter]
-    ) -> None:
+    def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
         """Write tiles that are wholly covered, from channels of shape (channels, n, side, side)."""
         for plane, channel in zip(self.planes[order], (*matter(values), np.ones_like(values[U])), strict=True):
             tiles.put(plane, channel)
 
     def _fill_rim(
-        self,
-        order: int,
-        tiles: Tiles,
-        values: Channels,
-        reach: NDArray[Any],
-        matter: Callable[[Channels], Matter],
+        self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
         """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach`: how much u changes
         at the most from a pixel's centre to its corners, (n,)."""
@@ -110,21 +104,26 @@ class DiskPlanes:
         inside = (columns < self._width) & (rows < self._height)
         where = (rows * self._width + columns).ravel()
         off = np.maximum(self._bent.low - values[U], values[U] - self._bent.high)
-        covered = ((off < 0.0) & inside).ravel()
-        near = np.flatnonzero((np.abs(off) < reach[:, None, None]) & inside)
-        right, below = slopes(values, near)
+        near = inside & (np.abs(off) < reach[:, None, None])
+        wholly = np.flatnonzero(inside & (off < 0.0) & ~near)
         channels = values.reshape(len(values), -1)
-        here = channels.take(near, axis=1)
-        share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
-        covered[near] = share == 1.0
-        partly = (share > 0.0) & (share < 1.0)
-        right, below, here = right[:, partly], below[:, partly], here[:, partly]
-        met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
-        moved = here + right * x + below * y
-        moved[U] = met
-        self._write(order, where[near[partly]], matter(moved), share[partly])
-        wholly = np.flatnonzero(covered)
         self._put(order, where.take(wholly), matter(channels.take(wholly, axis=1)), 1.0)
+        rim = np.flatnonzero(near)
+        right, below = slopes(values, rim)
+        self._rims[order, matter].append((where.take(rim), channels.take(rim, axis=1), right, below))
+
+    def fill_rims(self) -> None:
+        """Write the pixels next to the rims in the tiles filled: all at once, as there are few in each."""
+        for (order, matter), parts in self._rims.items():
+            where, here, right, below = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+            share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
+            seen = np.flatnonzero(share > 0.0)
+            right, below, here = (each.take(seen, axis=1) for each in (right, below, here))
+            met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
+            moved = here + right * x + below * y
+            moved[U] = met
+            self._write(order, where[seen], matter(moved), share[seen])
+        self._rims.clear()
 
     def write(
         self,
