@@ -24,7 +24,7 @@ from .disk_pass import DiskPass
 from .disk_pixels import DiskTracing
 from .disk_planes import BentU, Channels, DiskPlanes, mean_matter
 from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
-from .painting import GROUP_PIXELS, pool
+from .painting import pool
 from .rays import Array
 from .ring_painting import WEIGHTS, RingPainting, RingPixels, TileSurvey
 from .shot import WarpMapParameters
@@ -220,7 +220,7 @@ class DiskPainting:
         self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
     ) -> None:
         """Fill tiles some at a time, so that they stay in the cache."""
-        few = max(1, GROUP_PIXELS // tiles.side**2)
+        few = max(1, BLOCK_SIZE // tiles.side**2)
         for start in range(0, len(tiles), few):
             part = np.arange(start, min(start + few, len(tiles)))
             self._planes.fill(order, tiles.select(part), coefficients[part], matter)
