@@ -10,6 +10,7 @@ the band in it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -81,10 +82,11 @@ class TileSurvey:
 
     def extremes(self, values: Array) -> tuple[Array, Array]:
         """Return the smallest and largest value in each tile, shape (rows, columns), from values at the places."""
-        window = (self._looks + 1, self._looks + 1)
-        tiles = np.lib.stride_tricks.sliding_window_view(values.reshape(self._shape), window)
-        tiles = tiles[:: self._looks, :: self._looks]
-        return tiles.min(axis=(2, 3)), tiles.max(axis=(2, 3))
+        grid, looks = values.reshape(self._shape), self._looks
+        rows, columns = grid.shape[0] - looks, grid.shape[1] - looks
+        shifts = [(down, right) for down in range(looks + 1) for right in range(looks + 1)]
+        views = [grid[down : down + rows : looks, right : right + columns : looks] for down, right in shifts]
+        return functools.reduce(np.minimum, views), functools.reduce(np.maximum, views)
 
 
 class RingPainting:
