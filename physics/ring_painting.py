@@ -117,38 +117,49 @@ class RingPainting:
             yield self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
 
     def _pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
-        steps = np.arange(-1, tiles.side + 1) + 0.5  # a pixel more on each side, for slopes
+        wide = tiles.side + 2  # a pixel more on each side, for slopes
+        steps = np.arange(-1, tiles.side + 1) + 0.5
         x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
-        away, angle = (each.reshape(x.shape) for each in position_angles(self._view.light(x.ravel(), y.ravel())))
+        away, angle = position_angles(self._view.light(x.ravel(), y.ravel()))
         place = tiles.row // tiles.side, tiles.column // tiles.side
         nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
-        near = (away[OWN] > nearest) & (away[OWN] < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
-        tile, row, column = np.nonzero(near)
-        row, column = row + 1, column + 1
-        here = (tile, row, column)
-        columns, rows = x[here].astype(np.intp), y[here].astype(np.intp)
-        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle[here])
-        right, left = (tile, row, column + 1), (tile, row, column - 1)
-        below, above = (tile, row + 1, column), (tile, row - 1, column)
-        gone = [0.5 * (away[one] - away[other]) for one, other in ((right, left), (below, above))]
-        turned = [0.5 * nearest_turn(angle[one] - angle[other]) for one, other in ((right, left), (below, above))]
-        away, angle = away[here], angle[here]
-
-        def within(rim: Array, slope: Array) -> tuple[Array, Array]:
-            """Return the share of each pixel that is nearer to the hole's direction than a rim, and half of how the
-            distance from the rim changes over a pixel."""
-            across, down = (slope * turn - step for step, turn in zip(gone, turned, strict=True))
-            return share_above(rim - away, across, down), 0.5 * np.hypot(across, down)
-
-        inside, _ = within(inner, inner_slope)
-        outside, half = within(outer, outer_slope)
-        share = np.where(known, outside - inside, 0.0)
-        whole = share > 1.0 - LEAST_COVERAGE
-        partly = (share > LEAST_COVERAGE) & ~whole
-        low, high = (np.clip(away + each, inner, outer)[partly] for each in (-half, half))
+        own = away.reshape(x.shape)[OWN]
+        near = np.zeros(x.shape, dtype=bool)
+        near[OWN] = (own > nearest) & (own < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
+        here = np.flatnonzero(near)
+        tile, row, column = np.unravel_index(here, x.shape)
+        columns, rows = tiles.column[tile] + column - 1, tiles.row[tile] + row - 1
+        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle.take(here))
+        gone = [0.5 * (away.take(here + step) - away.take(here - step)) for step in (1, wide)]
+        turned = [0.5 * nearest_turn(angle.take(here + step) - angle.take(here - step)) for step in (1, wide)]
+        away, angle = away.take(here), angle.take(here)
+        # How the distance from each rim changes from pixel to pixel.
+        inner_steps, outer_steps = (
+            [slope * turn - step for turn, step in zip(turned, gone, strict=True)]
+            for slope in (inner_slope, outer_slope)
+        )
+        share = _share_within(outer - away, *outer_steps) - _share_within(inner - away, *inner_steps)
+        share[~known] = 0.0
+        whole = np.flatnonzero(share > 1.0 - LEAST_COVERAGE)
+        partly = np.flatnonzero((share > LEAST_COVERAGE) & (share <= 1.0 - LEAST_COVERAGE))
+        half = 0.5 * np.hypot(*(each.take(partly) for each in outer_steps))
+        middle, inner, outer = (each.take(partly) for each in (away, inner, outer))
+        low, high = (np.clip(middle + each, inner, outer) for each in (-half, half))
         places = low + PLACES[:, None] * (high - low)
         found = [
-            RingPixels(columns[whole], rows[whole], np.ones(np.count_nonzero(whole)), away[None, whole], angle[whole]),
-            RingPixels(columns[partly], rows[partly], share[partly], places, angle[partly]),
+            RingPixels(columns.take(each), rows.take(each), covered, seen, angle.take(each))
+            for each, covered, seen in (
+                (whole, np.ones(len(whole)), away[None, whole]),
+                (partly, share.take(partly), places),
+            )
         ]
         return found, columns[~known], rows[~known]
+
+
+def _share_within(off: Array, across: Array, down: Array) -> Array:
+    """Return the share of each pixel that is nearer to the hole's direction than a rim, from how much nearer its
+    centre is, and how that changes from pixel to pixel."""
+    share = (off > 0.0).astype(np.float64)
+    met = np.flatnonzero(np.abs(off) < 0.5 * (np.abs(across) + np.abs(down)))
+    share[met] = share_above(off.take(met), across.take(met), down.take(met))
+    return share
