@@ -237,26 +237,19 @@ class DiskPainting:
 
     def _paint_ring(self, order: int, ring: RingPainting, tiles: Tiles) -> Tiles:
         """Fill the smallest tiles from an image's table; return those that hold pixels it does not know."""
-        unknown = np.zeros((self._height, self._width), dtype=bool)
+        unknown = [(tiles.column[:0], tiles.row[:0])]
         for found, column, row in ring.pixels(tiles):
-            unknown[row, column] = True
+            unknown.append((column, row))
             for pixels in found:
                 known = self._write_ring(order, pixels)
-                unknown[pixels.row[~known], pixels.column[~known]] = True
-        if not unknown.any():
-            return tiles.select(np.zeros(len(tiles), dtype=bool))
-        self._tracing.trace_only(order, unknown)
-        side = TILE_SIDES[-1]
-        touched = pool(~self._tracing.far[order], side)
-        return tiles_of(self._width, self._height, side).select(touched.ravel())
+                unknown.append((pixels.column[~known], pixels.row[~known]))
+        columns, rows = (np.concatenate(each) for each in zip(*unknown, strict=True))
+        return self._tracing.trace_only(order, columns, rows)
 
     def _write_ring(self, order: int, pixels: RingPixels) -> Mask:
         """Write those pixels that an image's table knows; return which these are."""
-        places = pixels.away.shape
-        every = (np.broadcast_to(each, places) for each in (pixels.column + 0.5, pixels.row + 0.5, pixels.angle))
-        x, y, angle = (each.ravel() for each in every)
-        matter = self._samples.at_ring(order, x, y, pixels.away.ravel(), angle)
-        radius, phi, g = (each.reshape(places) for each in matter)
+        x, y = pixels.column.astype(np.float64) + 0.5, pixels.row.astype(np.float64) + 0.5
+        radius, phi, g = self._samples.at_ring(order, x, y, pixels.away, pixels.angle)
         known: Mask = np.isfinite(radius).all(axis=0)
         radius, phi, g = radius[:, known], phi[:, known], g[:, known]
         one = (radius[0], phi[0], g[0]) if len(radius) == 1 else mean_matter(radius, phi, g, WEIGHTS[:, None])
