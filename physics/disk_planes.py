@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .annulus import coverage, nearest_covered
 from .disk_samples import PHI, Matter, U
 from .painting import in_circle, wrapped
-from .rays import Array
+from .rays import Array, indices
 from .sky_table import nearest_turn
 from .tiles import TILE_SIDES, Tiles, at_pixels
 
@@ -85,15 +85,17 @@ class DiskPlanes:
         reach = _steepest(single[U], tiles.side)
         whole = (low - reach > self._bent.low) & (high + reach < self._bent.high)
         if whole.any():
-            self._fill_whole(order, tiles.select(whole), values[:, whole], matter)
-        rim = np.flatnonzero(~whole)
-        if len(rim):
-            self._fill_rim(order, tiles.select(rim), values[:, rim], reach[rim], matter)
+            part = indices(whole)
+            self._fill_whole(order, tiles.select(part), values[:, part], matter)
+        if not whole.all():
+            part = indices(~whole)
+            self._fill_rim(order, tiles.select(part), values[:, part], reach[part], matter)
 
     def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
         """Write tiles that are wholly covered, from channels of shape (channels, n, side, side)."""
-        for plane, channel in zip(self.planes[order], (*matter(values), np.ones_like(values[U])), strict=True):
+        for plane, channel in zip(self.planes[order], matter(values), strict=False):
             tiles.put(plane, channel)
+        tiles.put(self.planes[order, -1], np.broadcast_to(np.float32(1.0), values[U].shape))
 
     def _fill_rim(
         self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf

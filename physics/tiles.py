@@ -48,7 +48,7 @@ class Tiles:
     def __len__(self) -> int:
         return len(self.column)
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Tiles:
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Tiles:
         """Return the chosen tiles alone."""
         return Tiles(self.side, self.column[chosen], self.row[chosen])
 
