@@ -14,7 +14,7 @@ that are too thin for tiles; the rest is traced pixel by pixel (`disk_pixels`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,8 +183,8 @@ class DiskPainting:
             good &= smooth[:, SLOPE]
         filled = np.flatnonzero(good)
         direct, simple = self._matter_coefficients(bent[filled], sampled[:, filled], tiles.side)
-        self._fill(order, tiles.select(filled[simple]), direct, self._bent.matter)
-        self._fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
+        self._planes.fill(order, tiles.select(filled[simple]), direct, self._bent.matter)
+        self._planes.fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
         if tiles.side == TILE_SIDES[-1]:
             left = np.flatnonzero(~(good | empty))
             near = near_annulus(u[left], 1.0 / self._outer, 1.0 / self._inner)
@@ -215,15 +215,6 @@ class DiskPainting:
     def _matter(self, values: Channels) -> Matter:
         """Return the matter at places given by the channels, of which u is bent."""
         return self._samples.matter(np.stack([1.0 / self._bent.radius(values[U]), *values[PHI:]]))
-
-    def _fill(
-        self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
-    ) -> None:
-        """Fill tiles some at a time, so that they stay in the cache."""
-        few = max(1, BLOCK_SIZE // tiles.side**2)
-        for start in range(0, len(tiles), few):
-            part = np.arange(start, min(start + few, len(tiles)))
-            self._planes.fill(order, tiles.select(part), coefficients[part], matter)
 
     # --- bands around the shadow ---------------------------------------------------------------------
 

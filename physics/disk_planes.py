@@ -17,6 +17,7 @@ from .painting import in_circle, wrapped
 from .rays import Array, indices
 from .sky_table import nearest_turn
 from .tiles import TILE_SIDES, Tiles, at_pixels
+from .tracer import BLOCK_SIZE
 
 Index = NDArray[np.intp]
 Channels = NDArray[Any]
@@ -75,14 +76,26 @@ class DiskPlanes:
     def fill(self, order: int, tiles: Tiles, coefficients: Array, matter: MatterOf) -> None:
         """Fill tiles from Chebyshev coefficients, shape (n, channels, points, points), but for pixels next to a rim,
         which are left to `fill_rims`; the channels are bent u, azimuth, and what else `matter` needs to know."""
+        if not len(tiles):
+            return
         # Single precision is what is written, and enough for sums of terms of order 1.
-        single = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0), dtype=np.float32)
-        base, _ = _polynomials(tiles.side, single.shape[-1])
-        values: Channels = base @ single @ base.T
+        single = np.moveaxis(coefficients, 1, 0).astype(np.float32, order="C")
+        reach = _steepest(single[U], tiles.side)
+        few = max(1, BLOCK_SIZE // tiles.side**2)  # whose pixels stay in the cache
+        for start in range(0, len(tiles), few):
+            part = slice(start, start + few)
+            self._fill_some(order, tiles.select(part), single[:, part], reach[part], matter)
+
+    def _fill_some(
+        self, order: int, tiles: Tiles, coefficients: Channels, reach: NDArray[Any], matter: MatterOf
+    ) -> None:
+        """Do what `fill` does for some tiles, from coefficients of shape (channels, n, points, points); `reach`: how
+        much u changes at the most from a pixel's centre to its corners, (n,)."""
+        base, _ = _polynomials(tiles.side, coefficients.shape[-1])
+        values: Channels = base @ coefficients @ base.T
         u = values[U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is less than the steepest step.
-        reach = _steepest(single[U], tiles.side)
         whole = (low - reach > self._bent.low) & (high + reach < self._bent.high)
         if whole.any():
             part = indices(whole)
@@ -93,15 +106,14 @@ class DiskPlanes:
 
     def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
         """Write tiles that are wholly covered, from channels of shape (channels, n, side, side)."""
-        for plane, channel in zip(self.planes[order], matter(values), strict=False):
+        share = np.broadcast_to(np.float32(1.0), values[U].shape)
+        for plane, channel in zip(self.planes[order], (*matter(values), share), strict=True):
             tiles.put(plane, channel)
-        tiles.put(self.planes[order, -1], np.broadcast_to(np.float32(1.0), values[U].shape))
 
     def _fill_rim(
         self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
-        """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach`: how much u changes
-        at the most from a pixel's centre to its corners, (n,)."""
+        """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach` as above."""
         columns, rows = tiles.pixels()
         inside = (columns < self._width) & (rows < self._height)
         where = (rows * self._width + columns).ravel()

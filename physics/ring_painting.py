@@ -138,7 +138,7 @@ class RingPainting:
             [slope * turn - step for turn, step in zip(turned, gone, strict=True)]
             for slope in (inner_slope, outer_slope)
         )
-        share = _share_within(outer - away, *outer_steps) - _share_within(inner - away, *inner_steps)
+        share = share_above(outer - away, *outer_steps) - share_above(inner - away, *inner_steps)
         share[~known] = 0.0
         whole = np.flatnonzero(share > 1.0 - LEAST_COVERAGE)
         partly = np.flatnonzero((share > LEAST_COVERAGE) & (share <= 1.0 - LEAST_COVERAGE))
@@ -154,12 +154,3 @@ class RingPainting:
             )
         ]
         return found, columns[~known], rows[~known]
-
-
-def _share_within(off: Array, across: Array, down: Array) -> Array:
-    """Return the share of each pixel that is nearer to the hole's direction than a rim, from how much nearer its
-    centre is, and how that changes from pixel to pixel."""
-    share = (off > 0.0).astype(np.float64)
-    met = np.flatnonzero(np.abs(off) < 0.5 * (np.abs(across) + np.abs(down)))
-    share[met] = share_above(off.take(met), across.take(met), down.take(met))
-    return share
