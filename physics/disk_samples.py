@@ -88,13 +88,18 @@ class DiskSamples:
         for order in self._tables:
             here = np.flatnonzero(wanted[order, asked])
             u, *others = self._from_table(order, (energy[here], momentum[here]), away[here], angle[here])
-            known = np.isfinite(u)
+            known = np.flatnonzero(np.isfinite(u))
             here = asked[here[known]]
             left[order, here] = False
-            values[order, :, here] = np.stack([self._clipped(u), *others], axis=1)[known]
+            for channel, found in zip(values[order], (self._clipped(u), *others), strict=True):
+                channel[here] = found[known]
         traced = np.flatnonzero(left.any(axis=0))
         part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
-        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
+        for order, mine in enumerate(left[:, traced]):
+            known = np.flatnonzero(mine)
+            here = traced[known]
+            for channel, found in zip(values[order], part[order], strict=True):
+                channel[here] = found[known]
         return values, lost
 
     def _clipped(self, u: Array) -> Array:
