@@ -228,13 +228,13 @@ class DiskPainting:
 
     def _paint_ring(self, order: int, ring: RingPainting, tiles: Tiles) -> Tiles:
         """Fill the smallest tiles from an image's table; return those that hold pixels it does not know."""
-        unknown = [(tiles.column[:0], tiles.row[:0])]
-        for found, column, row in ring.pixels(tiles):
-            unknown.append((column, row))
-            for pixels in found:
-                known = self._write_ring(order, pixels)
-                unknown.append((pixels.column[~known], pixels.row[~known]))
-        columns, rows = (np.concatenate(each) for each in zip(*unknown, strict=True))
+        if not len(tiles):
+            return tiles
+        found, columns, rows = ring.pixels(tiles)
+        for pixels in found:
+            for block in pixels.blocks():
+                known = self._write_ring(order, block)
+                columns, rows = np.append(columns, block.column[~known]), np.append(rows, block.row[~known])
         return self._tracing.trace_only(order, columns, rows)
 
     def _write_ring(self, order: int, pixels: RingPixels) -> Mask:

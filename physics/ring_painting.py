@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +41,14 @@ BULGE, BESIDE_HOLE = 0.25, 2.0
 # Tiles worked through at a time: their pixels stay in the cache.
 GROUP = 64
 
+# Pixels that a table is asked for at a time, for the same reason.
+BLOCK = 8192
+
 # What of a tile with a pixel more on each side is the tile.
 OWN = (slice(None), slice(1, -1), slice(1, -1))
 
 
-@dataclass(frozen=True)
-class RingPixels:
+class RingPixels(NamedTuple):
     """Pixels that see a band, shape (n,)."""
 
     column: Index
@@ -58,6 +60,14 @@ class RingPixels:
     covered, else those of `PLACES`."""
     angle: Array
     """Position angle."""
+
+    def blocks(self) -> Iterator[RingPixels]:
+        """Yield some of them at a time."""
+        for start in range(0, len(self.column), BLOCK):
+            part = slice(start, start + BLOCK)
+            yield RingPixels(
+                self.column[part], self.row[part], self.share[part], self.away[:, part], self.angle[part]
+            )
 
 
 class TileSurvey:
@@ -111,12 +121,21 @@ class RingPainting:
         """Return the smallest tiles that the band may touch."""
         return tiles_of(self._width, self._height, TILE_SIDES[-1]).select(self.touched.ravel())
 
-    def pixels(self, tiles: Tiles) -> Iterator[tuple[list[RingPixels], Index, Index]]:
-        """Yield pixels of some of the smallest tiles at a time, and columns and rows of those that are not known."""
-        for start in range(0, len(tiles), GROUP):
-            yield self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
+    def pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
+        """Return the pixels of one or more of the smallest tiles that see the band, those that are wholly covered and
+        others, and columns and rows of those that are not known."""
+        groups = [
+            self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
+            for start in range(0, len(tiles), GROUP)
+        ]
+        whole, partly, columns, rows = zip(*groups, strict=True)
+        found = [
+            RingPixels(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+            for parts in (whole, partly)
+        ]
+        return found, np.concatenate(columns), np.concatenate(rows)
 
-    def _pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
+    def _pixels(self, tiles: Tiles) -> tuple[RingPixels, RingPixels, Index, Index]:
         wide = tiles.side + 2  # a pixel more on each side, for slopes
         steps = np.arange(-1, tiles.side + 1) + 0.5
         x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
@@ -146,11 +165,9 @@ class RingPainting:
         middle, inner, outer = (each.take(partly) for each in (away, inner, outer))
         low, high = (np.clip(middle + each, inner, outer) for each in (-half, half))
         places = low + PLACES[:, None] * (high - low)
-        found = [
-            RingPixels(columns.take(each), rows.take(each), covered, seen, angle.take(each))
-            for each, covered, seen in (
-                (whole, np.ones(len(whole)), away[None, whole]),
-                (partly, share.take(partly), places),
-            )
-        ]
-        return found, columns[~known], rows[~known]
+        return (
+            RingPixels(columns[whole], rows[whole], np.ones(len(whole)), away[None, whole], angle[whole]),
+            RingPixels(columns[partly], rows[partly], share[partly], places, angle[partly]),
+            columns[~known],
+            rows[~known],
+        )
