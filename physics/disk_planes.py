@@ -169,15 +169,13 @@ def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
     at some places, given by their numbers in (n, side, side); none where a neighbour is not known."""
     side = values.shape[-1]
     flat = values.reshape(len(values), -1)
-    found = []
-    for step, at in ((1, place % side), (side, place // side % side)):
-        before, after = at > 0, at < side - 1  # one only at the tile's own edge
-        change = flat.take(place + step * after, axis=1) - flat.take(place - step * before, axis=1)
-        change[PHI] = nearest_turn(change[PHI])
-        change = change / (1.0 + (before & after))
-        change[np.isnan(change)] = 0.0
-        found.append(change)
-    return found[0], found[1]
+    step, at = np.array([[1], [side]]), np.stack([place % side, place // side % side])
+    before, after = at > 0, at < side - 1  # one only at the tile's own edge
+    change = flat.take(place + step * after, axis=1) - flat.take(place - step * before, axis=1)
+    change[PHI] = nearest_turn(change[PHI])
+    change = change / (1.0 + (before & after))
+    change[np.isnan(change)] = 0.0
+    return change[:, 0], change[:, 1]
 
 
 @cache
