@@ -17,7 +17,6 @@ from .painting import in_circle, wrapped
 from .rays import Array, indices
 from .sky_table import nearest_turn
 from .tiles import TILE_SIDES, Tiles, at_pixels
-from .tracer import BLOCK_SIZE
 
 Index = NDArray[np.intp]
 Channels = NDArray[Any]
@@ -81,7 +80,7 @@ class DiskPlanes:
         # Single precision is what is written, and enough for sums of terms of order 1.
         single = np.moveaxis(coefficients, 1, 0).astype(np.float32, order="C")
         reach = _steepest(single[U], tiles.side)
-        few = max(1, BLOCK_SIZE // tiles.side**2)  # whose pixels stay in the cache
+        few = (TILE_SIDES[0] // tiles.side) ** 2  # with as many pixels as the largest tile, which stay in the cache
         for start in range(0, len(tiles), few):
             part = slice(start, start + few)
             self._fill_some(order, tiles.select(part), single[:, part], reach[part], matter)
