@@ -27,11 +27,12 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
 
     The integral of max(z, 0) twice over: exact for a plane.
     """
-    one, other = np.abs(slope_x), np.abs(slope_y)
+    height, one, other = np.broadcast_arrays(height, np.abs(slope_x), np.abs(slope_y))
     long = np.maximum(np.maximum(one, other), FLAT)
     short = np.maximum(np.minimum(one, other), LEAST_SLOPE * long)
-    short = short / long
-    height = np.clip(height / long, -1.0, 1.0)  # beyond half of 1 + short nothing changes
+    share = np.where(height > 0.0, 1.0, 0.0)
+    met = ~(np.abs(height) >= 0.5 * (long + short))  # elsewhere the line passes by the square
+    height, short = height[met] / long[met], short[met] / long[met]
 
     def twice(z: Array) -> Array:
         positive = np.maximum(z, 0.0)
@@ -39,11 +40,9 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
         return half_square
 
     far, near = 0.5 * (1.0 + short), 0.5 * (1.0 - short)
-    share = (twice(height + far) - twice(height + near) - twice(height - near) + twice(height - far)) / short
-    # Far above, differences of large squares cancel.
-    share = np.where(height >= far, 1.0, np.where(height <= -far, 0.0, share))
-    clipped: Array = np.clip(share, 0.0, 1.0)
-    return clipped
+    part = (twice(height + far) - twice(height + near) - twice(height - near) + twice(height - far)) / short
+    share[met] = np.clip(part, 0.0, 1.0)
+    return share
 
 
 def coverage(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> Array:

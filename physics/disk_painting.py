@@ -14,7 +14,7 @@ that are too thin for tiles; the rest is traced pixel by pixel (`disk_pixels`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from .disk_pass import DiskPass
 from .disk_pixels import DiskTracing
 from .disk_planes import BentU, Channels, DiskPlanes, mean_matter
 from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
-from .painting import GROUP_PIXELS, pool
+from .painting import pool
 from .rays import Array
 from .ring_painting import WEIGHTS, RingPainting, RingPixels, TileSurvey
 from .shot import WarpMapParameters
@@ -118,6 +118,7 @@ class DiskPainting:
                 wanted = np.repeat(wanted, 4, axis=0)
                 inside = (waiting.column < self._width) & (waiting.row < self._height)
                 waiting, wanted = waiting.select(inside), wanted[inside]
+        self._planes.fill_rims()
         for order, ring in rings.items():
             tiles = ring.tiles() if order >= FIRST_THIN else waiting.select(wanted[:, order])
             wanted[:, order] = False
@@ -183,8 +184,8 @@ class DiskPainting:
             good &= smooth[:, SLOPE]
         filled = np.flatnonzero(good)
         direct, simple = self._matter_coefficients(bent[filled], sampled[:, filled], tiles.side)
-        self._fill(order, tiles.select(filled[simple]), direct, self._bent.matter)
-        self._fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
+        self._planes.fill(order, tiles.select(filled[simple]), direct, self._bent.matter)
+        self._planes.fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
         if tiles.side == TILE_SIDES[-1]:
             left = np.flatnonzero(~(good | empty))
             near = near_annulus(u[left], 1.0 / self._outer, 1.0 / self._inner)
@@ -216,15 +217,6 @@ class DiskPainting:
         """Return the matter at places given by the channels, of which u is bent."""
         return self._samples.matter(np.stack([1.0 / self._bent.radius(values[U]), *values[PHI:]]))
 
-    def _fill(
-        self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
-    ) -> None:
-        """Fill tiles some at a time, so that they stay in the cache."""
-        few = max(1, GROUP_PIXELS // tiles.side**2)
-        for start in range(0, len(tiles), few):
-            part = np.arange(start, min(start + few, len(tiles)))
-            self._planes.fill(order, tiles.select(part), coefficients[part], matter)
-
     # --- bands around the shadow ---------------------------------------------------------------------
 
     def _rings(self) -> dict[int, RingPainting]:
@@ -237,26 +229,19 @@ class DiskPainting:
 
     def _paint_ring(self, order: int, ring: RingPainting, tiles: Tiles) -> Tiles:
         """Fill the smallest tiles from an image's table; return those that hold pixels it does not know."""
-        unknown = np.zeros((self._height, self._width), dtype=bool)
-        for found, column, row in ring.pixels(tiles):
-            unknown[row, column] = True
-            for pixels in found:
-                known = self._write_ring(order, pixels)
-                unknown[pixels.row[~known], pixels.column[~known]] = True
-        if not unknown.any():
-            return tiles.select(np.zeros(len(tiles), dtype=bool))
-        self._tracing.trace_only(order, unknown)
-        side = TILE_SIDES[-1]
-        touched = pool(~self._tracing.far[order], side)
-        return tiles_of(self._width, self._height, side).select(touched.ravel())
+        if not len(tiles):
+            return tiles
+        found, columns, rows = ring.pixels(tiles)
+        for pixels in found:
+            for block in pixels.blocks():
+                known = self._write_ring(order, block)
+                columns, rows = np.append(columns, block.column[~known]), np.append(rows, block.row[~known])
+        return self._tracing.trace_only(order, columns, rows)
 
     def _write_ring(self, order: int, pixels: RingPixels) -> Mask:
         """Write those pixels that an image's table knows; return which these are."""
-        places = pixels.away.shape
-        every = (np.broadcast_to(each, places) for each in (pixels.column + 0.5, pixels.row + 0.5, pixels.angle))
-        x, y, angle = (each.ravel() for each in every)
-        matter = self._samples.at_ring(order, x, y, pixels.away.ravel(), angle)
-        radius, phi, g = (each.reshape(places) for each in matter)
+        x, y = pixels.column.astype(np.float64) + 0.5, pixels.row.astype(np.float64) + 0.5
+        radius, phi, g = self._samples.at_ring(order, x, y, pixels.away, pixels.angle)
         known: Mask = np.isfinite(radius).all(axis=0)
         radius, phi, g = radius[:, known], phi[:, known], g[:, known]
         one = (radius[0], phi[0], g[0]) if len(radius) == 1 else mean_matter(radius, phi, g, WEIGHTS[:, None])

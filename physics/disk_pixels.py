@@ -12,10 +12,11 @@ from .annulus import coverage, nearest_covered
 from .disk_planes import DiskPlanes, mean_matter, slopes
 from .disk_samples import DiskSamples, U
 from .rays import Array
-from .tiles import Tiles
+from .tiles import TILE_SIDES, Tiles, tiles_of
 from .tracer import BLOCK_SIZE
 
 Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
 
 # So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter for differences between pixels;
 # and in 1 / M for large disks, whose outer rim is next to infinity.
@@ -51,14 +52,20 @@ class DiskTracing:
         self.unresolved = np.zeros((self._height, self._width), dtype=bool)
         """Pixels whose ray was given up."""
 
-    def trace_only(self, order: int, chosen: Mask) -> None:
-        """Fill none but the chosen pixels of a crossing, shape (height, width); neighbours are traced along."""
-        near = np.zeros((self._height + 2 * BESIDE, self._width + 2 * BESIDE), dtype=bool)
-        for down in range(2 * BESIDE + 1):
-            for right in range(2 * BESIDE + 1):
-                near[down : down + self._height, right : right + self._width] |= chosen
-        self.far[order] = ~near[BESIDE:-BESIDE, BESIDE:-BESIDE]
-        self._kept[order] = ~chosen
+    def trace_only(self, order: int, columns: Index, rows: Index) -> Tiles:
+        """Leave none but the chosen pixels of a crossing, shape (n,), to be filled; neighbours are traced along. Return
+        the smallest tiles that hold any of these."""
+        beside = np.arange(-BESIDE, BESIDE + 1)
+        column = np.clip(columns[:, None, None] + beside, 0, self._width - 1)
+        row = np.clip(rows[:, None, None] + beside[:, None], 0, self._height - 1)
+        self.far[order] = True
+        self.far[order, row, column] = False
+        self._kept[order] = np.ones((self._height, self._width), dtype=bool)
+        self._kept[order][rows, columns] = False
+        side = TILE_SIDES[-1]
+        held = np.zeros((-(-self._height // side), -(-self._width // side)), dtype=bool)
+        held[row // side, column // side] = True
+        return tiles_of(self._width, self._height, side).select(held.ravel())
 
     def steps(self, tiles: Tiles, wanted: Mask, done: float) -> Generator[float, None, None]:
         """Fill tiles, for the crossings that are wanted of each, by a ray for each pixel or more; yield fractions from
@@ -98,13 +105,14 @@ class DiskTracing:
             finer &= open_here
             with np.errstate(invalid="ignore"):
                 share = coverage(here[U], across, down, self._low, self._high)
-                seen = np.nonzero((share > 0.0) & ~finer & open_here)
-            u, x, y = nearest_covered(here[U][seen], across[seen], down[seen], self._low, self._high)
+                seen = np.flatnonzero((share > 0.0) & ~finer & open_here)
+            moved = here.reshape(len(here), -1).take(seen, axis=1)
+            u, x, y = nearest_covered(moved[U], across.take(seen), down.take(seen), self._low, self._high)
             right, below = slopes(here, seen)
-            moved = here[:, seen[0], seen[1], seen[2]] + right * x + below * y
+            moved += right * x + below * y
             moved[U] = u
-            place = (columns[chosen][seen], rows[chosen][seen])
-            self._planes.write(order, place, self._samples.matter(moved), share[seen])
+            place = (columns[chosen].take(seen), rows[chosen].take(seen))
+            self._planes.write(order, place, self._samples.matter(moved), share.take(seen))
             self._divide(order, columns[chosen][finer], rows[chosen][finer], here[:, finer])
 
     def _needs_finer(self, u: Array, across: Array, down: Array) -> Mask:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,14 +14,14 @@ from numpy.typing import NDArray
 from .annulus import coverage, nearest_covered
 from .disk_samples import PHI, Matter, U
 from .painting import in_circle, wrapped
-from .rays import Array
+from .rays import Array, indices
 from .sky_table import nearest_turn
 from .tiles import TILE_SIDES, Tiles, at_pixels
 
-Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 Channels = NDArray[Any]
 """Shape (channels, ...), in single precision for whole tiles."""
+MatterOf = Callable[[Channels], Matter]
 
 # u is bent from this many times its value at the inner rim on.
 BENT_FROM = 2.0
@@ -68,68 +70,73 @@ class DiskPlanes:
         self._width, self._height = width, height
         self._bent = bent
         self.planes = np.zeros((crossings, 4, height, width), np.float32)
+        self._rims: defaultdict[tuple[int, MatterOf], list[tuple[Index, Channels, Array, Array]]] = defaultdict(list)
 
-    def fill(
-        self, order: int, tiles: Tiles, coefficients: Array, matter: Callable[[Channels], Matter]
-    ) -> None:
-        """Fill whole tiles from Chebyshev coefficients, shape (n, channels, points, points); the channels are bent u,
-        azimuth, and what else `matter` needs to know."""
+    def fill(self, order: int, tiles: Tiles, coefficients: Array, matter: MatterOf) -> None:
+        """Fill tiles from Chebyshev coefficients, shape (n, channels, points, points), but for pixels next to a rim,
+        which are left to `fill_rims`; the channels are bent u, azimuth, and what else `matter` needs to know."""
+        if not len(tiles):
+            return
         # Single precision is what is written, and enough for sums of terms of order 1.
-        points = coefficients.shape[-1]
-        base = at_pixels(tiles.side, points)[0].astype(np.float32)
-        single = coefficients.astype(np.float32)
-        values: NDArray[Any] = base @ single @ base.T
-        u = values[:, U].reshape(len(tiles), -1)
+        single = np.moveaxis(coefficients, 1, 0).astype(np.float32, order="C")
+        reach = _steepest(single[U], tiles.side)
+        few = (TILE_SIDES[0] // tiles.side) ** 2  # with as many pixels as the largest tile, which stay in the cache
+        for start in range(0, len(tiles), few):
+            part = slice(start, start + few)
+            self._fill_some(order, tiles.select(part), single[:, part], reach[part], matter)
+
+    def _fill_some(
+        self, order: int, tiles: Tiles, coefficients: Channels, reach: NDArray[Any], matter: MatterOf
+    ) -> None:
+        """Do what `fill` does for some tiles, from coefficients of shape (channels, n, points, points); `reach`: how
+        much u changes at the most from a pixel's centre to its corners, (n,)."""
+        base, _ = _polynomials(tiles.side, coefficients.shape[-1])
+        values: Channels = base @ coefficients @ base.T
+        u = values[U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is less than the steepest step.
-        reach = _steepest(single[:, U], tiles.side)
         whole = (low - reach > self._bent.low) & (high + reach < self._bent.high)
         if whole.any():
-            self._write_tiles(order, tiles.select(whole), values[whole], None, matter)
-        rim = np.flatnonzero(~whole)
-        if len(rim):
-            self._fill_rim(order, tiles.select(rim), values[rim], reach[rim], matter)
+            part = indices(whole)
+            self._fill_whole(order, tiles.select(part), values[:, part], matter)
+        if not whole.all():
+            part = indices(~whole)
+            self._fill_rim(order, tiles.select(part), values[:, part], reach[part], matter)
+
+    def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
+        """Write tiles that are wholly covered, from channels of shape (channels, n, side, side)."""
+        share = np.broadcast_to(np.float32(1.0), values[U].shape)
+        for plane, channel in zip(self.planes[order], (*matter(values), share), strict=True):
+            tiles.put(plane, channel)
 
     def _fill_rim(
-        self,
-        order: int,
-        tiles: Tiles,
-        values: Channels,
-        reach: NDArray[Any],
-        matter: Callable[[Channels], Matter],
+        self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
-        """Write tiles with a rim in them from channels of shape (n, channels, side, side); `reach`: how much u changes
-        at the most from a pixel's centre to its corners, (n,)."""
-        u = values[:, U]
-        off = np.maximum(self._bent.low - u, u - self._bent.high)
-        covered = off < 0.0
-        tile, row, column = np.nonzero(np.abs(off) < reach[:, None, None])
-        inside = (tiles.column[tile] + column < self._width) & (tiles.row[tile] + row < self._height)
-        place = tile[inside], row[inside], column[inside]
-        by_channel = np.moveaxis(values, 1, 0)
-        right, below = slopes(by_channel, place)
-        here = by_channel[:, *place]
-        share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
-        covered[place] = share == 1.0
-        partly = (share > 0.0) & (share < 1.0)
-        right, below, here = right[:, partly], below[:, partly], here[:, partly]
-        met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
-        moved = here + right * x + below * y
-        moved[U] = met
-        np.clip(u, self._bent.low, self._bent.high, out=u)
-        self._write_tiles(order, tiles, values, covered, matter)
-        tile, row, column = (each[partly] for each in place)
-        where = (tiles.column[tile] + column, tiles.row[tile] + row)
-        self.write(order, where, matter(moved), share[partly])
+        """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach` as above."""
+        columns, rows = tiles.pixels()
+        inside = (columns < self._width) & (rows < self._height)
+        where = (rows * self._width + columns).ravel()
+        off = np.maximum(self._bent.low - values[U], values[U] - self._bent.high)
+        near = inside & (np.abs(off) < reach[:, None, None])
+        wholly = np.flatnonzero(inside & (off < 0.0) & ~near)
+        channels = values.reshape(len(values), -1)
+        self._put(order, where.take(wholly), matter(channels.take(wholly, axis=1)), 1.0)
+        rim = np.flatnonzero(near)
+        right, below = slopes(values, rim)
+        self._rims[order, matter].append((where.take(rim), channels.take(rim, axis=1), right, below))
 
-    def _write_tiles(
-        self, order: int, tiles: Tiles, values: NDArray[Any], covered: Mask | None, matter: Callable[[Channels], Matter]
-    ) -> None:
-        """Write tiles from channels of shape (n, channels, side, side), where they are wholly covered: None for all."""
-        radius, phi, g = matter(np.moveaxis(values, 1, 0))
-        share = np.ones_like(radius) if covered is None else covered
-        for plane, channel in zip(self.planes[order], (radius, phi, g, share), strict=True):
-            tiles.put(plane, channel, covered)
+    def fill_rims(self) -> None:
+        """Write the pixels next to the rims in the tiles filled: all at once, as there are few in each."""
+        for (order, matter), parts in self._rims.items():
+            where, here, right, below = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+            share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
+            seen = np.flatnonzero(share > 0.0)
+            right, below, here = (each.take(seen, axis=1) for each in (right, below, here))
+            met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
+            moved = here + right * x + below * y
+            moved[U] = met
+            self._write(order, where[seen], matter(moved), share[seen])
+        self._rims.clear()
 
     def write(
         self,
@@ -142,32 +149,45 @@ class DiskPlanes:
 
         Light that cannot be, where a place was moved too far to a rim next to the horizon, leaves its pixel empty.
         """
+        columns, rows = place
+        self._write(order, rows * self._width + columns, matter, share)
+
+    def _write(self, order: int, where: Index, matter: Matter, share: Array) -> None:
+        """Do what `write` does for pixels given by their numbers in the picture."""
         known = matter[2] > 0.0
-        columns, rows = (each[known] for each in place)
+        radius, phi, g = (each[known] for each in matter)
+        self._put(order, where[known], (radius, phi, g), share[known])
+
+    def _put(self, order: int, where: Index, matter: Matter, share: Array | float) -> None:
         for plane, values in zip(self.planes[order], (*matter, share), strict=True):
-            plane[rows, columns] = values[known]
+            plane.reshape(-1)[where] = values  # by one number is quicker than by row and column
 
 
-def slopes(values: Array, place: tuple[Index, ...]) -> tuple[Array, Array]:
+def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
     """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, side, side)
-    at some places; none where a neighbour is not known."""
-    tile, row, column = place
-    last = values.shape[-1] - 1
-    found = []
-    for down, right in ((0, 1), (1, 0)):
-        before = values[:, tile, np.maximum(row - down, 0), np.maximum(column - right, 0)]
-        after = values[:, tile, np.minimum(row + down, last), np.minimum(column + right, last)]
-        steps = 1.0 + ((row if down else column) % last != 0)  # one only at the tile's own edge
-        change = after - before
-        change[PHI] = nearest_turn(change[PHI])
-        found.append(np.nan_to_num(change / steps))
-    return found[0], found[1]
+    at some places, given by their numbers in (n, side, side); none where a neighbour is not known."""
+    side = values.shape[-1]
+    flat = values.reshape(len(values), -1)
+    step, at = np.array([[1], [side]]), np.stack([place % side, place // side % side])
+    before, after = at > 0, at < side - 1  # one only at the tile's own edge
+    change = flat.take(place + step * after, axis=1) - flat.take(place - step * before, axis=1)
+    change[PHI] = nearest_turn(change[PHI])
+    change = change / (1.0 + (before & after))
+    change[np.isnan(change)] = 0.0
+    return change[:, 0], change[:, 1]
+
+
+@cache
+def _polynomials(side: int, count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return what `at_pixels` does, in single precision."""
+    base, slope = at_pixels(side, count)
+    return base.astype(np.float32), slope.astype(np.float32)
 
 
 def _steepest(coefficients: NDArray[Any], side: int) -> NDArray[Any]:
     """Return how much tiles, given by Chebyshev coefficients of shape (n, points, points), change at the most from a
     pixel's centre to its corners, shape (n,): from as many places as there are pixels in the smallest tiles."""
-    base, slope = (each.astype(np.float32) for each in at_pixels(TILE_SIDES[-1], coefficients.shape[-1]))
+    base, slope = _polynomials(TILE_SIDES[-1], coefficients.shape[-1])
     per_pixel = TILE_SIDES[-1] / side
     change = np.abs(base @ coefficients @ slope.T) + np.abs(slope @ coefficients @ base.T)
     steepest: NDArray[Any] = (0.5 * STEEPER * per_pixel) * change.max(axis=(1, 2))

@@ -83,19 +83,24 @@ class DiskSamples:
             return self._trace_rays(x, y, wanted)
         values, lost = np.full((self._disk.crossings, self.channels, len(x)), np.nan), np.zeros(len(x), dtype=bool)
         asked = np.flatnonzero(wanted[list(self._tables)].any(axis=0))
-        energy, momentum = self._light(x[asked], y[asked])
-        away, angle = position_angles(self._view.light(x[asked], y[asked]))
+        light, energy, momentum = self._view.light_and_momenta(x[asked], y[asked])
+        away, angle = position_angles(light)
         left = wanted.copy()
         for order in self._tables:
             here = np.flatnonzero(wanted[order, asked])
             u, *others = self._from_table(order, (energy[here], momentum[here]), away[here], angle[here])
-            known = np.isfinite(u) if smooth else ~np.isnan(u)
+            known = np.flatnonzero(np.isfinite(u) if smooth else ~np.isnan(u))
             here = asked[here[known]]
             left[order, here] = False
-            values[order, :, here] = np.stack([self._clipped(u), *others], axis=1)[known]
+            for channel, found in zip(values[order], (self._clipped(u), *others), strict=True):
+                channel[here] = found[known]
         traced = np.flatnonzero(left.any(axis=0))
         part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
-        values[:, :, traced] = np.where(left[:, None, traced], part, values[:, :, traced])
+        for order, mine in enumerate(left[:, traced]):
+            known = np.flatnonzero(mine)
+            here = traced[known]
+            for channel, found in zip(values[order], part[order], strict=True):
+                channel[here] = found[known]
         return values, lost
 
     def _clipped(self, u: Array) -> Array:
@@ -159,15 +164,16 @@ class DiskSamples:
         return {order: table for order, table in self._tables.items() if table.confined}
 
     def at_ring(self, order: int, x: Array, y: Array, away: Array, angle: Array) -> Matter:
-        """Return the matter at `position_angles` that pixel coordinates x, y are near to, shape (n,), from the table of
-        an image; NaN where it has no answer."""
-        u, *others = self._from_table(order, self._light(x, y), away, angle)
-        return self.matter(np.stack([np.clip(u, 1.0 / self._outer, 1.0 / self._inner), *others]))
+        """Return the matter at `position_angles` that pixel coordinates x, y, shape (n,), are near to, from the
+        table of an image; NaN where it has no answer.
 
-    def _light(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return energy and angular momentum of the light seen at pixel coordinates, for a camera energy of 1."""
-        rays = self._view.rays(x, y)
-        return rays.one_plus_z, rays.b * rays.one_plus_z
+        There may be several angles from the hole's direction for each: `away`, and what is returned, is of shape
+        (k, n).
+        """
+        every = [np.broadcast_to(each, away.shape).ravel() for each in (*self._view.light_and_momenta(x, y)[1:], angle)]
+        u, *others = self._from_table(order, (every[0], every[1]), away.ravel(), every[2])
+        u = np.clip(u, 1.0 / self._outer, 1.0 / self._inner)
+        return self.matter(np.stack([u, *others]).reshape(self.channels, *away.shape))
 
     def _from_table(self, order: int, light: tuple[Array, Array], away: Array, angle: Array) -> list[Array]:
         """Return the channels at position angles where the light is about this, from the table of an image."""

@@ -281,4 +281,9 @@ def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
 def in_circle(phi: NDArray[np.floating[Any]]) -> Image:
     """Return any angles brought to [0, 2 pi) in single precision."""
     turn = phi.dtype.type(2.0 * math.pi)
-    return wrapped(phi - turn * np.floor(phi * (1.0 / turn)))
+    rest = np.floor(phi * (1.0 / turn))
+    rest *= turn
+    np.subtract(phi, rest, out=rest)
+    single = rest.astype(np.float32, copy=False)
+    single[(single < 0.0) | (single >= np.float32(turn))] = 0.0  # by rounding
+    return single

@@ -10,8 +10,9 @@ the band in it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +41,14 @@ BULGE, BESIDE_HOLE = 0.25, 2.0
 # Tiles worked through at a time: their pixels stay in the cache.
 GROUP = 64
 
+# Pixels that a table is asked for at a time, for the same reason.
+BLOCK = 8192
+
 # What of a tile with a pixel more on each side is the tile.
 OWN = (slice(None), slice(1, -1), slice(1, -1))
 
 
-@dataclass(frozen=True)
-class RingPixels:
+class RingPixels(NamedTuple):
     """Pixels that see a band, shape (n,)."""
 
     column: Index
@@ -57,6 +60,14 @@ class RingPixels:
     covered, else those of `PLACES`."""
     angle: Array
     """Position angle."""
+
+    def blocks(self) -> Iterator[RingPixels]:
+        """Yield some of them at a time."""
+        for start in range(0, len(self.column), BLOCK):
+            part = slice(start, start + BLOCK)
+            yield RingPixels(
+                self.column[part], self.row[part], self.share[part], self.away[:, part], self.angle[part]
+            )
 
 
 class TileSurvey:
@@ -81,10 +92,11 @@ class TileSurvey:
 
     def extremes(self, values: Array) -> tuple[Array, Array]:
         """Return the smallest and largest value in each tile, shape (rows, columns), from values at the places."""
-        window = (self._looks + 1, self._looks + 1)
-        tiles = np.lib.stride_tricks.sliding_window_view(values.reshape(self._shape), window)
-        tiles = tiles[:: self._looks, :: self._looks]
-        return tiles.min(axis=(2, 3)), tiles.max(axis=(2, 3))
+        grid, looks = values.reshape(self._shape), self._looks
+        rows, columns = grid.shape[0] - looks, grid.shape[1] - looks
+        shifts = [(down, right) for down in range(looks + 1) for right in range(looks + 1)]
+        views = [grid[down : down + rows : looks, right : right + columns : looks] for down, right in shifts]
+        return functools.reduce(np.minimum, views), functools.reduce(np.maximum, views)
 
 
 class RingPainting:
@@ -109,44 +121,53 @@ class RingPainting:
         """Return the smallest tiles that the band may touch."""
         return tiles_of(self._width, self._height, TILE_SIDES[-1]).select(self.touched.ravel())
 
-    def pixels(self, tiles: Tiles) -> Iterator[tuple[list[RingPixels], Index, Index]]:
-        """Yield pixels of some of the smallest tiles at a time, and columns and rows of those that are not known."""
-        for start in range(0, len(tiles), GROUP):
-            yield self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
+    def pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
+        """Return the pixels of one or more of the smallest tiles that see the band, those that are wholly covered and
+        others, and columns and rows of those that are not known."""
+        groups = [
+            self._pixels(tiles.select(np.arange(start, min(start + GROUP, len(tiles)))))
+            for start in range(0, len(tiles), GROUP)
+        ]
+        whole, partly, columns, rows = zip(*groups, strict=True)
+        found = [
+            RingPixels(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+            for parts in (whole, partly)
+        ]
+        return found, np.concatenate(columns), np.concatenate(rows)
 
-    def _pixels(self, tiles: Tiles) -> tuple[list[RingPixels], Index, Index]:
-        steps = np.arange(-1, tiles.side + 1) + 0.5  # a pixel more on each side, for slopes
+    def _pixels(self, tiles: Tiles) -> tuple[RingPixels, RingPixels, Index, Index]:
+        wide = tiles.side + 2  # a pixel more on each side, for slopes
+        steps = np.arange(-1, tiles.side + 1) + 0.5
         x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
-        away, angle = (each.reshape(x.shape) for each in position_angles(self._view.light(x.ravel(), y.ravel())))
+        away, angle = position_angles(self._view.light(x.ravel(), y.ravel()))
         place = tiles.row // tiles.side, tiles.column // tiles.side
         nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
-        near = (away[OWN] > nearest) & (away[OWN] < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
-        tile, row, column = np.nonzero(near)
-        row, column = row + 1, column + 1
-        here = (tile, row, column)
-        columns, rows = x[here].astype(np.intp), y[here].astype(np.intp)
-        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle[here])
-        right, left = (tile, row, column + 1), (tile, row, column - 1)
-        below, above = (tile, row + 1, column), (tile, row - 1, column)
-        gone = [0.5 * (away[one] - away[other]) for one, other in ((right, left), (below, above))]
-        turned = [0.5 * nearest_turn(angle[one] - angle[other]) for one, other in ((right, left), (below, above))]
-        away, angle = away[here], angle[here]
-
-        def within(rim: Array, slope: Array) -> tuple[Array, Array]:
-            """Return the share of each pixel that is nearer to the hole's direction than a rim, and half of how the
-            distance from the rim changes over a pixel."""
-            across, down = (slope * turn - step for step, turn in zip(gone, turned, strict=True))
-            return share_above(rim - away, across, down), 0.5 * np.hypot(across, down)
-
-        inside, _ = within(inner, inner_slope)
-        outside, half = within(outer, outer_slope)
-        share = np.where(known, outside - inside, 0.0)
-        whole = share > 1.0 - LEAST_COVERAGE
-        partly = (share > LEAST_COVERAGE) & ~whole
-        low, high = (np.clip(away + each, inner, outer)[partly] for each in (-half, half))
+        own = away.reshape(x.shape)[OWN]
+        near = np.zeros(x.shape, dtype=bool)
+        near[OWN] = (own > nearest) & (own < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
+        here = np.flatnonzero(near)
+        tile, row, column = np.unravel_index(here, x.shape)
+        columns, rows = tiles.column[tile] + column - 1, tiles.row[tile] + row - 1
+        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle.take(here))
+        gone = [0.5 * (away.take(here + step) - away.take(here - step)) for step in (1, wide)]
+        turned = [0.5 * nearest_turn(angle.take(here + step) - angle.take(here - step)) for step in (1, wide)]
+        away, angle = away.take(here), angle.take(here)
+        # How the distance from each rim changes from pixel to pixel.
+        inner_steps, outer_steps = (
+            [slope * turn - step for turn, step in zip(turned, gone, strict=True)]
+            for slope in (inner_slope, outer_slope)
+        )
+        share = share_above(outer - away, *outer_steps) - share_above(inner - away, *inner_steps)
+        share[~known] = 0.0
+        whole = np.flatnonzero(share > 1.0 - LEAST_COVERAGE)
+        partly = np.flatnonzero((share > LEAST_COVERAGE) & (share <= 1.0 - LEAST_COVERAGE))
+        half = 0.5 * np.hypot(*(each.take(partly) for each in outer_steps))
+        middle, inner, outer = (each.take(partly) for each in (away, inner, outer))
+        low, high = (np.clip(middle + each, inner, outer) for each in (-half, half))
         places = low + PLACES[:, None] * (high - low)
-        found = [
-            RingPixels(columns[whole], rows[whole], np.ones(np.count_nonzero(whole)), away[None, whole], angle[whole]),
+        return (
+            RingPixels(columns[whole], rows[whole], np.ones(len(whole)), away[None, whole], angle[whole]),
             RingPixels(columns[partly], rows[partly], share[partly], places, angle[partly]),
-        ]
-        return found, columns[~known], rows[~known]
+            columns[~known],
+            rows[~known],
+        )

@@ -188,12 +188,13 @@ def angle_steps(angle: Array, count: int) -> tuple[NDArray[np.intp], Array]:
 
 def lagrange_weights(part: Array, points: tuple[int, ...]) -> list[Array]:
     """Return the weights of Lagrange's interpolation among points at whole numbers, for places between 0 and 1."""
+    away = {point: part - point for point in points}
     weights = []
     for point in points:
         others = [other for other in points if other != point]
-        weight = np.full_like(part, 1.0 / math.prod(point - other for other in others))
-        for other in others:
-            weight *= part - other
+        weight = away[others[0]] * (1.0 / math.prod(point - other for other in others))
+        for other in others[1:]:
+            weight *= away[other]
         weights.append(weight)
     return weights
 

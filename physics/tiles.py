@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Tiles:
     def __len__(self) -> int:
         return len(self.column)
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Tiles:
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Tiles:
         """Return the chosen tiles alone."""
         return Tiles(self.side, self.column[chosen], self.row[chosen])
 
@@ -91,12 +92,7 @@ def tiles_of(width: int, height: int, side: int) -> Tiles:
     return Tiles(side, column.ravel(), row.ravel())
 
 
-def _points(count: int) -> Array:
-    """Chebyshev points of the first kind on (0, 1), shape (count,)."""
-    points: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
-    return points
-
-
+@cache
 def _to_coefficients(count: int) -> Array:
     """The matrix from values at Chebyshev points to Chebyshev coefficients, shape (count, count)."""
     order, point = np.mgrid[0:count, 0:count]
@@ -112,10 +108,6 @@ def _at_pixels(side: int, count: int) -> Array:
     return polynomials
 
 
-_PLACES = _points(POINTS)
-_COEFFICIENTS = _to_coefficients(POINTS)
-
-
 def sample_places(tiles: Tiles, count: int = POINTS) -> tuple[Array, Array]:
     """Return the pixel coordinates of the tiles' Chebyshev points, by tile, row and column, shape (n * count^2,)."""
     places = chebyshev_places(count)
@@ -126,14 +118,14 @@ def sample_places(tiles: Tiles, count: int = POINTS) -> tuple[Array, Array]:
 
 
 def chebyshev_places(count: int = POINTS) -> Array:
-    """Return where along a tile's side its points are, 0 to 1, shape (count,)."""
-    return _PLACES if count == POINTS else _points(count)
+    """Return where along a tile's side its points, Chebyshev's of the first kind, are, 0 to 1, shape (count,)."""
+    places: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    return places
 
 
 def coefficients_of(values: Array) -> Array:
     """Return the Chebyshev coefficients of samples by row and column, shape (..., count, count)."""
-    count = values.shape[-1]
-    matrix = _COEFFICIENTS if count == POINTS else _to_coefficients(count)
+    matrix = _to_coefficients(values.shape[-1])
     coefficients: Array = matrix @ values @ matrix.T
     return coefficients
 
@@ -157,7 +149,7 @@ def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Arra
         Whether the interpolation's error is below `tolerance` radians; false where any sample sees no sky.
     """
     values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, -1)
-    coefficients = _COEFFICIENTS @ np.moveaxis(values, -1, 1) @ _COEFFICIENTS.T
+    coefficients = coefficients_of(np.moveaxis(values, -1, 1))
     rest = tails_of(coefficients).sum(axis=1)
     return coefficients, TAIL_SHARE * rest < tolerance  # NaN: False
 

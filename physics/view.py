@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .cameras import PanoramaCamera
 from .crossings import Crossings, LightAtDisk
 from .disk_tracer import disk_crossings
+from .metric import metric_functions
 from .observer import Observer
 from .rays import (
     Array,
@@ -64,6 +65,15 @@ class View:
         seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
         light, _ = light_in_fido_frame(self._observer, seen, self._camera_to_triad)
         return light
+
+    def light_and_momenta(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """Return what `light` does, and the light's energy at infinity and angular momentum for a camera energy of 1,
+        shape (n,): Eqs. 7, 8 and 13."""
+        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        light, doppler = light_in_fido_frame(self._observer, seen, self._camera_to_triad)
+        metric = metric_functions(self._spin, self._observer.r, self._observer.theta)
+        momentum = doppler * light[2] * metric.varpi
+        return light, metric.alpha * doppler + metric.omega * momentum, momentum
 
     def edge(self, x: Array, y: Array) -> Array:
         """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""
