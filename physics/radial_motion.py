@@ -305,7 +305,8 @@ def _ends(
     """Return paths into the hole, shape (n,), up to their ends, and for which of them that is well known.
 
     `u`, `slope`: at the nodes of more paths, of which these have the numbers `index`; `left`: where those are no
-    longer on their way. Chebyshev's method, Newton's of third order, for 1 / u^(1/2), which is nearly linear, from the last node before.
+    longer on their way. Chebyshev's method, Newton's with the second derivative, for 1 / u^(1/2), which is nearly
+    linear, from the last node before the end.
     """
     in_order = rule.in_order[:, None], index
     first = left[in_order].argmax(axis=0)
