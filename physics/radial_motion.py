@@ -239,20 +239,20 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
         span[:, barrier.blocks & (rays.observer.r <= barrier.radius)] = np.nan
     longest = (LONGEST_FIRST + LONGEST_MORE * (len(times) - 1)) / every.function.rate
     known = np.zeros(times.shape, dtype=bool)
-    tried = np.isnan(span)
     for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
-        order, ray = np.nonzero((span <= most) & ~tried if count != NODE_COUNTS[-1] else np.isfinite(span) & ~known)
+        follow = beyond and count > NODE_COUNTS[0]  # the few of the first go on with the others
+        order, ray = np.nonzero((span <= most) & ~known)
         if len(ray) < FEW and count != NODE_COUNTS[-1]:
             continue
-        tried[order, ray] = True
         for start in range(0, len(ray), CHUNK):
             place = order[start : start + CHUNK], ray[start : start + CHUNK]
             time = times[place]
             with np.errstate(all="ignore"):  # beyond a path's end there may be poles; what is not finite is not known
                 followed = every.for_times(place[1], np.minimum(time, longest[place[1]]))
-                found.u[place], found.u_slope[place], found.unwound[place], known[place] = _places(
-                    followed, time, _RULES[count], tolerance, beyond
-                )
+                *there, known[place], ended = _places(followed, time, _RULES[count], tolerance, follow)
+            found.u[place], found.u_slope[place], found.unwound[place] = there
+            if not beyond:
+                known[place[0][ended], place[1][ended]] = True
     found.resolved[:] = (known | np.isnan(times)).all(axis=0)
     left = np.flatnonzero(~found.resolved)
     if len(left):
@@ -261,9 +261,10 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
 
 
 def _places(
-    paths: _Paths, time: Array, rule: _Rule, tolerance: float, beyond: bool
-) -> tuple[Array, Array, Array, Mask]:
-    """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, and where known."""
+    paths: _Paths, time: Array, rule: _Rule, tolerance: float, follow: bool
+) -> tuple[Array, Array, Array, Mask, Index]:
+    """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, where that is known,
+    and which rays have fallen in before: only with `follow` is it known of these."""
     u, slope = paths.nodes(rule)
     unwound, error = paths.unwound(rule, u, slope)
     place, rate = u[-1], slope[-1]
@@ -275,15 +276,14 @@ def _places(
     place[back], rate[back] = paths.lowest[back], 0.0
     left = paths.inward & ~((u > 0.0) & (u < paths.highest) & (slope > 0.0))
     index = np.flatnonzero(left.any(axis=0))
-    if not beyond:
-        known[index], place[index], unwound[index], error[index] = True, paths.highest, 0.0, 0.0
-    elif len(index):
-        ends, met = _ends(paths.for_times(index, paths.time[index]), rule, u, slope, left, index, tolerance)
-        known[index] = met
+    if follow and len(index):
+        ends, known[index] = _ends(paths.for_times(index, paths.time[index]), rule, u, slope, left, index, tolerance)
         further = time[index] - ends.time
         place[index], rate[index], unwound[index], error[index] = _beyond_end(ends, further, rule)
+    else:
+        known[index], place[index] = False, paths.highest
     known &= (error * error <= TAIL_SQUARE * tolerance) & np.isfinite(place) & np.isfinite(unwound)
-    return place, rate, unwound, known
+    return place, rate, unwound, known, index
 
 
 def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, Array, Array]:
