@@ -153,31 +153,37 @@ class PolarMotion:
             height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
         if abs(height) < IN_PLANE:  # cos(pi / 2) in floating point is not 0
             height = 0.0
-        crosses = (self.base > 0.0) & (np.hypot(height, rise) > IN_PLANE)
-        first = np.arctan2(abs(height), -rise * np.copysign(1.0, height)) if height else np.full(len(rise), np.pi)
+        reach = np.hypot(height, rise)
+        crosses = (self.base > 0.0) & (reach > IN_PLANE)
+        # the angle along the path to the plane, its cosine and its sine: all but for the reach
+        along, aside = (-rise if height >= 0.0 else rise), abs(height)
+        first = np.arctan2(aside, along) if height else np.full(len(rise), np.pi)
         usable = crosses & self.usable(tolerance)
         time, turn = np.full((2, len(rise)), np.nan), np.full((2, len(rise)), np.nan)  # first, and from one to the next
         for chosen, integrals in (
-            (np.flatnonzero(usable), self._series_to_plane),
-            (np.flatnonzero(crosses & ~usable), self._quadrature_to_plane),
+            (usable, self._series_to_plane),
+            (crosses & ~usable, self._quadrature_to_plane),
         ):
-            if len(chosen):
-                time[:, chosen], turn[:, chosen] = integrals(chosen, first[chosen], tolerance)
-        cos, sin = np.cos(first), np.sin(first)
+            if chosen.any():
+                those = indices(chosen)
+                time[:, those], turn[:, those] = integrals(those, first[those], tolerance)
+        if not height:
+            along = np.full(len(rise), -1.0)
         # Rays that never cross may have no tangent either.
-        along_theta, along_phi = (np.where(crosses, each, 0.0) for each in (self.tangent_theta, self.tangent_phi))
+        along_theta, along_phi = (
+            np.where(crosses, each * aside, 0.0) for each in (self.tangent_theta, self.tangent_phi)
+        )
         x, y = (
-            self.triad[0, i] * cos + (self.triad[1, i] * along_theta + self.triad[2, i] * along_phi) * sin
-            for i in (0, 1)
+            self.triad[0, i] * along + self.triad[1, i] * along_theta + self.triad[2, i] * along_phi for i in (0, 1)
         )
         order = np.arange(count)[:, None]
         turn[1] += np.copysign(np.pi, self.b)
         return time[0] + order * time[1], np.arctan2(y, x) + turn[0] + order * turn[1]
 
-    def _series_to_plane(self, chosen: NDArray[np.intp], first: Array, tolerance: float) -> tuple[Array, Array]:
+    def _series_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
         """Return Mino time and drift to the first crossing and from one to the next, shape (2, n) each."""
         part, a2 = self.select(chosen), self.spin * self.spin
-        time, turn = np.empty((2, len(chosen))), np.zeros((2, len(chosen)))
+        time, turn = np.empty((2, len(first))), np.zeros((2, len(first)))
         for members, largest in part._classes():
             rays = part.select(members)
             angle = np.stack([first[members], np.full(len(rays.b), np.pi)])
@@ -195,7 +201,7 @@ class PolarMotion:
                 turn[:, members] = path * (a2 * rays.b / (rays.pole_speed * rays.mean))
         return time, turn
 
-    def _quadrature_to_plane(self, chosen: NDArray[np.intp], first: Array, tolerance: float) -> tuple[Array, Array]:
+    def _quadrature_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
         """Return what `_series_to_plane` does, by Gauss-Legendre quadrature of 1 / s and f over chi.
 
         1 / s is singular at sin(chi) = +-i eps, eps^2 = A / (a^2 w_+), which chi = eps sinh(t) keeps away.
@@ -206,18 +212,17 @@ class PolarMotion:
         rule = _SMALL_PLANE_RULE if tolerance >= SMALL_RULE_TOLERANCE else _PLANE_RULE
         nodes, weights = (each[:, None] for each in rule)
 
-        def integrals(angle: Array) -> Array:
-            half = 0.5 * np.arcsinh(angle / near)
-            t = half * (1.0 + nodes)
-            speed = np.sqrt(part.base + swing * np.sin(near * np.sinh(t)) ** 2)
-            step = weights * half * near * np.cosh(t) / speed
-            drift = step * (a2 * part.b / part.pole_speed) / (speed + part.pole_speed)
-            return np.stack([step.sum(axis=0), drift.sum(axis=0)])
-
-        quarter = integrals(np.full(len(chosen), 0.5 * np.pi))
-        ahead = integrals(np.minimum(first, np.pi - first))
-        to_first = np.where(first > 0.5 * np.pi, 2.0 * quarter - ahead, ahead)
-        return np.stack([to_first[0], 2.0 * quarter[0]]), np.stack([to_first[1], 2.0 * quarter[1]])
+        angle = np.stack([np.minimum(first, np.pi - first), np.full(len(first), 0.5 * np.pi)])[:, None]
+        half = 0.5 * np.arcsinh(angle / near)
+        t = half * (1.0 + nodes)
+        speed = np.sqrt(part.base + swing * np.sin(near * np.sinh(t)) ** 2)
+        step = weights * half * near * np.cosh(t) / speed
+        drift = step * (a2 * part.b / part.pole_speed) / (speed + part.pole_speed)
+        (ahead, quarter), (turn_ahead, turn_quarter) = step.sum(axis=1), drift.sum(axis=1)
+        farther = first > 0.5 * np.pi
+        time = np.where(farther, 2.0 * quarter - ahead, ahead)
+        turn = np.where(farther, 2.0 * turn_quarter - turn_ahead, turn_ahead)
+        return np.stack([time, 2.0 * quarter]), np.stack([turn, 2.0 * turn_quarter])
 
     def select(self, chosen: Indices) -> PolarMotion:
         """Return the motion of the chosen rays alone."""

@@ -238,22 +238,25 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
         span = times * every.function.rate
         span[:, barrier.blocks & (rays.observer.r <= barrier.radius)] = np.nan
     longest = (LONGEST_FIRST + LONGEST_MORE * (len(times) - 1)) / every.function.rate
-    known = np.zeros(times.shape, dtype=bool)
+    known = np.zeros(times.size, dtype=bool)
+    span, time_of = span.ravel(), times.ravel()
+    parts = [values.reshape(-1) for values in (found.u, found.u_slope, found.unwound)]
     for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
         follow = beyond and count > NODE_COUNTS[0]  # the few of the first go on with the others
-        order, ray = np.nonzero((span <= most) & ~known)
-        if len(ray) < FEW and count != NODE_COUNTS[-1]:
+        pairs = np.flatnonzero((span <= most) & ~known)
+        if len(pairs) < FEW and count != NODE_COUNTS[-1]:
             continue
-        for start in range(0, len(ray), CHUNK):
-            place = order[start : start + CHUNK], ray[start : start + CHUNK]
-            time = times[place]
+        for start in range(0, len(pairs), CHUNK):
+            some = pairs[start : start + CHUNK]
+            ray, time = some % len(rays), time_of[some]
             with np.errstate(all="ignore"):  # beyond a path's end there may be poles; what is not finite is not known
-                followed = every.for_times(place[1], np.minimum(time, longest[place[1]]))
-                *there, known[place], ended = _places(followed, time, _RULES[count], tolerance, follow)
-            found.u[place], found.u_slope[place], found.unwound[place] = there
+                followed = every.for_times(ray, np.minimum(time, longest[ray]))
+                *there, known[some], ended = _places(followed, time, _RULES[count], tolerance, follow)
+            for values, new in zip(parts, there, strict=True):
+                values[some] = new
             if not beyond:
-                known[place[0][ended], place[1][ended]] = True
-    found.resolved[:] = (known | np.isnan(times)).all(axis=0)
+                known[some[ended]] = True
+    found.resolved[:] = (known.reshape(times.shape) | np.isnan(times)).all(axis=0)
     left = np.flatnonzero(~found.resolved)
     if len(left):
         found.put(left, places_by_series(rays.select(left), barrier.select(left), times[:, left], tolerance))
