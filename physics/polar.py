@@ -153,9 +153,12 @@ class PolarMotion:
             height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
         if abs(height) < IN_PLANE:  # cos(pi / 2) in floating point is not 0
             height = 0.0
-        reach = np.hypot(height, rise)
-        crosses = (self.base > 0.0) & (reach > IN_PLANE)
-        # the angle along the path to the plane, its cosine and its sine: all but for the reach
+        crosses = (self.base > 0.0) & (np.hypot(height, rise) > IN_PLANE)
+        # Rays that never cross may have no tangent either.
+        rise, along_theta, along_phi = (
+            np.where(crosses, each, 0.0) for each in (rise, self.tangent_theta, self.tangent_phi)
+        )
+        # Cosine and sine of the angle along the path to the plane, both times their hypotenuse.
         along, aside = (-rise if height >= 0.0 else rise), abs(height)
         first = np.arctan2(aside, along) if height else np.full(len(rise), np.pi)
         usable = crosses & self.usable(tolerance)
@@ -169,12 +172,9 @@ class PolarMotion:
                 time[:, those], turn[:, those] = integrals(those, first[those], tolerance)
         if not height:
             along = np.full(len(rise), -1.0)
-        # Rays that never cross may have no tangent either.
-        along_theta, along_phi = (
-            np.where(crosses, each * aside, 0.0) for each in (self.tangent_theta, self.tangent_phi)
-        )
         x, y = (
-            self.triad[0, i] * along + self.triad[1, i] * along_theta + self.triad[2, i] * along_phi for i in (0, 1)
+            self.triad[0, i] * along + (self.triad[1, i] * along_theta + self.triad[2, i] * along_phi) * aside
+            for i in (0, 1)
         )
         order = np.arange(count)[:, None]
         turn[1] += np.copysign(np.pi, self.b)
