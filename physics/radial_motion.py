@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .mino import radial_polynomial
 from .quadrature import gauss_legendre, negative_root
-from .radial_path import BEYOND, TAIL, Places, beyond_horizon, winding
+from .radial_path import TAIL, Places, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
 from .rays import Array, Rays
 from .trapped import Barrier
@@ -42,6 +42,13 @@ FEW = 800
 # What the highest coefficients may amount to, squared, in units of the tolerance: the error was found to be a hundredth
 # of that square, as Gauss's and Legendre's rule is good for polynomials of twice the degree.
 TAIL_SQUARE = 50.0
+
+# Times by which rounding may grow, per tolerance: it is 1e-11 of the elliptic function at the most.
+MOST_LOST = 1e10
+
+# A path into the hole whose slope is above minus this has not turned; and how well its end has to be met, in u.
+HOVERING = 1e-3
+END_ERROR = 0.05
 
 # No ray is followed longer than this for the first crossing that may be asked for, and for each more, in the same
 # units.
@@ -121,7 +128,7 @@ class _Paths:
             constants[4] = rays.b
             constants[5] = rays.carter + spin * (spin - 2.0 * rays.b)
             constants[6] = ~barrier.blocks & (rays.radial >= 0.0)
-            constants[7] = -BEYOND * negative_root(rays)
+            constants[7] = -negative_root(rays)
             constants[8] = np.sqrt(np.maximum(rays.carter + spin * spin, 0.0))
             return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
 
@@ -157,7 +164,7 @@ class _Paths:
 
     @property
     def lowest(self) -> Array:
-        """u beyond infinity where rays stay."""
+        """U's negative root, to some per cent, where rays stay that have gone beyond infinity."""
         lowest: Array = self.constants[7]
         return lowest
 
@@ -186,16 +193,20 @@ class _Paths:
         """Return u from the camera on."""
         return QuarticMotion(self.function, self.quartic, np.full_like(self.slope, self.start), self.slope)
 
-    def nodes(self, rule: _Rule) -> tuple[Array, Array]:
-        """Return u and du / dlambda at a rule's nodes, in the middle and at the end, shape (2 k + 2, n)."""
+    def nodes(self, rule: _Rule) -> tuple[Array, Array, Array]:
+        """Return u and du / dlambda at a rule's nodes, in the middle and at the end, shape (2 k + 2, n), and how many
+        times rounding has grown on the way there, at the most."""
         value, slope = self.function.at((0.5 * self.time) * rule.sides)
-        middle = self.motion().after(value[0], slope[0])
-        after, before = QuarticMotion(self.function, self.quartic, *middle).around(value, slope)
+        motion = self.motion()
+        middle = motion.after(value[0], slope[0])
+        from_middle = QuarticMotion(self.function, self.quartic, *middle)
+        after, before = from_middle.around(value, slope)
         u, rate = (
             np.concatenate([later[1:], earlier[1:], centre[None], later[:1]])
             for later, earlier, centre in zip(after, before, middle, strict=True)
         )
-        return u, rate
+        lost = np.maximum(motion.cancellation(value[0], slope[0]), from_middle.cancellation(value[0], slope[0]))
+        return u, rate, lost
 
     def turn_rate(self, u: Array, slope: Array) -> Array:
         """Return dpsi / dlambda without the winding W(u), regular at the horizon on the way in (`radial_path`)."""
@@ -267,39 +278,44 @@ def _places(
     paths: _Paths, time: Array, rule: _Rule, tolerance: float, follow: bool
 ) -> tuple[Array, Array, Array, Mask, Index]:
     """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, where that is known,
-    and which rays have fallen in before: only with `follow` is it known of these."""
-    u, slope = paths.nodes(rule)
+    and which rays have fallen in before for certain: only with `follow` is it known of these."""
+    u, slope, lost = paths.nodes(rule)
     unwound, error = paths.unwound(rule, u, slope)
     place, rate = u[-1], slope[-1]
-    known = time == paths.time
-    # On to U's negative root and back: what has been beyond infinity stays there.
-    gone = (u <= 0.0).any(axis=0) & ~paths.inward
-    known |= gone
-    back = gone & ((place > 0.0) | (rate >= 0.0) & (place > paths.lowest))
+    # Beyond infinity u falls to U's negative root and would come back: there rays stay.
+    beyond_sky = (u <= 0.0) & ~paths.inward
+    gone = beyond_sky.any(axis=0)
+    in_time = time == paths.time
+    back = gone & ((beyond_sky & (slope >= 0.0)).any(axis=0) | (place > 0.0) | ~in_time)
     place[back], rate[back] = paths.lowest[back], 0.0
-    left = paths.inward & ~((u > 0.0) & (u < paths.highest) & (slope > 0.0))
+    known = in_time | gone
+    outside = paths.inward & ~((u > 0.0) & (u < paths.highest))
+    # Next to the critical curve rays hover, and rounding tells the sign of their slope.
+    left = outside | (paths.inward & (slope <= -HOVERING))
     index = np.flatnonzero(left.any(axis=0))
     if follow and len(index):
         ends, known[index] = _ends(paths.for_times(index, paths.time[index]), rule, u, slope, left, index, tolerance)
         further = time[index] - ends.time
-        place[index], rate[index], unwound[index], error[index] = _beyond_end(ends, further, rule)
+        place[index], rate[index], unwound[index], error[index], lost[index] = _beyond_end(ends, further, rule)
     else:
         known[index], place[index] = False, paths.highest
-    known &= (error * error <= TAIL_SQUARE * tolerance) & np.isfinite(place) & np.isfinite(unwound)
-    return place, rate, unwound, known, index
+    exact = lost <= MOST_LOST * tolerance
+    known &= exact & (error * error <= TAIL_SQUARE * tolerance) & np.isfinite(place) & np.isfinite(unwound)
+    return place, rate, unwound, known, index[(exact & outside.any(axis=0))[index]]
 
 
-def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, Array, Array]:
-    """Return u, du / dlambda, psi - W(u) and what tells its error so much later than the end of paths into the hole:
-    along a parabola, and turning on at the last rate."""
-    u, slope = paths.nodes(rule)
+def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, Array, Array, Array]:
+    """Return u, du / dlambda, psi - W(u), what tells its error and how rounding has grown, so much later than the end
+    of paths into the hole: along a parabola, and turning on at the last rate."""
+    u, slope, lost = paths.nodes(rule)
     unwound, error = paths.unwound(rule, u, slope)
     end, steep = u[-1], slope[-1]
+    lost = np.where(np.abs(end / paths.highest - 1.0) < END_ERROR, lost, np.inf)  # an end that is none
     bend = acceleration(paths.quartic, end)
     late = np.where(bend < 0.0, np.minimum(late, -steep / bend), late)  # beyond its vertex u would come back
     if paths.spin != 0.0:
         unwound += late * paths.turn_rate(end, steep)
-    return end + late * (steep + 0.5 * late * bend), steep + late * bend, unwound, error
+    return end + late * (steep + 0.5 * late * bend), steep + late * bend, unwound, error, lost
 
 
 def _ends(

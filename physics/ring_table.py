@@ -50,17 +50,15 @@ EDGE_ERROR = 1e-3
 THIRD = 2
 
 # Position angles at which the scale is looked for, and distances from the edge there: shares of its own distance from
-# the hole's direction, from 1 down by this factor to this part of what the image may be as thin as, e^(-pi) for each
-# half turn, or to where nothing is seen any more.
+# the hole's direction, from the largest to the smallest.
 SCALE_ANGLES = 16
-SHARE_FACTOR = 2.15
-LEAST_PART, LEAST_SHARE = 0.05, 1e-9
+SHARES = np.geomspace(1.0, 1e-9, 28)
 
 # Of what is found there, waves up to this are kept: steps between the distances make the others.
 MOST_WAVES = 5
 
 # A table holds the image and so much of asinh(delta / w) on both sides.
-BAND_MARGIN = 1.25
+BAND_MARGIN = 1.5
 
 # Rounds of Newton's method that find a rim between two columns, where it is nearly straight.
 RIM_ROUNDS = 4
@@ -136,9 +134,9 @@ class RingTable:
         known = rims[0].known & rims[1].known
         self._band = _pairs([each[around] for rim in reversed(rims) for each in (rim.away, rim.slope)])
         self._band_known = np.lib.stride_tricks.sliding_window_view(known[around], len(AROUND)).all(axis=1)
-        # A ray that is not known deep inside the shadow is of no disk.
+        # Rays at the ends that are not known are of no disk.
         ends_inside = not (u[:, :2] < self._rims[1]).any()
-        ends_outside = bool((u[:, -2:] < self._rims[0]).all())
+        ends_outside = not (u[:, -2:] >= self._rims[0]).any()
         within = ends_inside and ends_outside
         self.confined = bool(within and np.isfinite(self._band).all() and known.mean() > ENOUGH_ROWS)
         """Whether all of the image is in the table: it is a band around the shadow."""
@@ -265,9 +263,7 @@ def ring_tables(spin: float, observer: Observer, orders: Sequence[int], needs: N
     sky = _Sky(spin, Observer.fido(observer.r, observer.theta, observer.phi), max(orders) + 1, needs)
     few = sky.evenly(SCALE_ANGLES)
     edge = sky.edge[few]
-    least = max(LEAST_SHARE, LEAST_PART * math.exp(-math.pi * max(orders)))
-    shares = np.geomspace(1.0, least, 1 + math.ceil(-math.log(least) / math.log(SHARE_FACTOR)))
-    distances = np.concatenate([-REACH[0] * shares, REACH[1] * shares[::-1]]) * edge[:, None]
+    distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
     (scouted,) = sky.cross([(edge[:, None] + distances, few, list(orders))])
     drafts = {order: _Draft.of(u, distances, edge, needs) for order, u in zip(orders, scouted[0], strict=True)}
     found: dict[int, Array] = {}
@@ -344,7 +340,7 @@ class _Draft:
     @classmethod
     def of(cls, u: Array, distances: Array, edge: Array, needs: Needs) -> _Draft:
         """Return what is found from u at distances from the edge, shape (angles, distances)."""
-        scale = _scale(u, distances, edge, needs)
+        scale = _scale(u, edge, needs)
         stretched = np.arcsinh(distances / scale[:, None])
         band = _band(u, stretched, needs)
         if band is None:
@@ -380,14 +376,14 @@ def _band(u: Array, stretched: Array, needs: Needs) -> tuple[Array, Array] | Non
     return found[0], found[1]
 
 
-def _scale(u: Array, distances: Array, edge: Array, needs: Needs) -> Array:
+def _scale(u: Array, edge: Array, needs: Needs) -> Array:
     """Return w for a few position angles from u at distances from the edge, the farthest first and last."""
-    half = u.shape[1] // 2
+    half = len(SHARES)
     inside, outside = u[:, :half][:, ::-1], u[:, half:]  # from the edge away
     change = np.fmax(np.abs(inside - inside[:, :1]), np.abs(outside - outside[:, :1]))
     changed = np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner
     changed[:, -1] = True  # where nothing crowds, the largest will do
-    scale: Array = np.take_along_axis(distances[:, half:], changed.argmax(axis=1)[:, None], axis=1)[:, 0] / REACH[1]
+    scale: Array = SHARES[::-1][changed.argmax(axis=1)] * edge
     return scale
 
 

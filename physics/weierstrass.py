@@ -135,6 +135,14 @@ class QuarticMotion:
         """Return u and u' after the time of P and P', and as long before."""
         return self._places(value, slope, before=True)
 
+    def cancellation(self, value: Array, slope: Array) -> Array:
+        """Return how much larger than 1 what u - u_0 is a quotient's difference of gets, shape (n,): where u as long
+        before is at a pole, so is all of it but the difference."""
+        q = value - self._shift
+        below = 2.0 * q * q - self._fourth
+        size: Array = (np.abs(self.bend * q + self._third) + np.abs(self.slope * slope)) / np.abs(below)
+        return size
+
     def _places(self, value: Array, slope: Array, before: bool = False) -> list[tuple[Array, Array]]:
         # With u - u_0 = N / D: u' = (N' - (u - u_0) D') / D; P' alone is odd in time.
         q = value - self._shift

@@ -6,14 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from physics import Observer
+from physics import Observer, trace_disk
 from physics.metric import horizon_radius
 from physics.polar import PolarMotion
+from physics.quadrature import negative_root
 from physics.radial_motion import TIGHTEST, places_of_rays
 from physics.radial_path import places_of_rays as places_by_series
 from physics.radial_path import winding
 from physics.rays import rays_from_triad
-from physics.trapped import around_hole, find_barrier
+from physics.trapped import around_hole, edge_angles, find_barrier
 
 CROSSINGS = 4
 
@@ -76,6 +77,55 @@ def test_rays_beyond_infinity_stay_there():
     ended = (sky | straight_out) & (expected.u < 0.0)
     assert ended.sum() > 500
     assert (found.u[ended] <= 0.0).all()
+    # not on the way back either: next to U's negative root, where the series stay at 0.7 of the way or more
+    far = np.broadcast_to(-0.69 * negative_root(rays), ended.shape)
+    assert (ended & (expected.u < far)).sum() > 500
+    assert (found.u < 0.9 * far)[ended & (expected.u < far)].all()
+
+
+def around_the_edge(spin, r, theta, shares):
+    """Rays at shares of the angle of the shadow's edge from it, beside the edge all around; rays, barrier, times."""
+    fido = Observer.fido(r, theta, 0.0)
+    turn = np.linspace(0.0, 2.0 * math.pi, len(shares), endpoint=False) * 17.0
+    edge = edge_angles(spin, fido, np.cos(turn), np.sin(turn), 1e-13)
+    rays = rays_from_triad(spin, fido, around_hole(edge * (1.0 + shares), np.cos(turn), np.sin(turn)))
+    return rays, find_barrier(rays), PolarMotion.of(rays).plane_crossings(8, 1e-12)[0]
+
+
+@pytest.mark.parametrize("spin", [0.0, 0.001, 0.05, 0.9])
+def test_rays_that_fell_in_do_not_come_out_again(spin):
+    """At late crossings the closed form may be past the pole, and on its way back."""
+    rays, barrier, times = around_the_edge(spin, 15.0, 1.2, -np.geomspace(1e-7, 0.999, 4000))
+    found, expected = places_of_rays(rays, barrier, times, 1e-6), places_by_series(rays, barrier, times, 1e-9)
+    horizon = 1.0 / horizon_radius(spin)
+    fallen = (found.resolved & expected.resolved) & (expected.u > 1.01 * horizon)
+    assert fallen.sum() > 10_000
+    assert (found.u[fallen] > 0.99 * horizon).all()
+
+
+@pytest.mark.parametrize("spin", [0.0, 0.6, 0.999])
+@pytest.mark.parametrize("beyond", [True, False])
+def test_rays_that_hover_have_not_ended(spin, beyond):
+    """Within 1e-13 of the edge rounding tells the sign of their slope."""
+    shares = np.geomspace(1e-13, 1e-9, 2000) * np.tile([1.0, -1.0], 1000)
+    rays, barrier, times = around_the_edge(spin, 15.0, 1.3, shares)
+    found, expected = (way(rays, barrier, times, 1e-6) for way in (places_of_rays, places_by_series))
+    if not beyond:
+        found = places_of_rays(rays, barrier, times, 1e-6, beyond=False)
+    horizon = 1.0 / horizon_radius(spin)
+    both = found.resolved & expected.resolved
+    clear = both & (expected.u > 0.01) & (expected.u < 0.9 * horizon)
+    assert clear.sum() > 5000
+    assert ((found.u > 0.0) & (found.u < horizon))[clear].all()
+
+
+def test_where_the_closed_form_cancels_it_does_not_answer():
+    """As long before the camera as after it this ray would be at the pole, where all of the quotient is rounding."""
+    fido = Observer.fido(2.2, 1.2, 0.0)
+    directions = 0.9865548311539617, 5.721813758960459
+    found, expected = (trace_disk(0.0, fido, *directions, tolerance=tolerance) for tolerance in (1e-6, 1e-10))
+    assert found.radius[1] == pytest.approx(expected.radius[1], rel=1e-4)
+    assert expected.radius[1] == pytest.approx(11.03, abs=0.01)
 
 
 def test_without_what_is_beyond_only_the_ends_are_known():
