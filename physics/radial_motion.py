@@ -43,7 +43,7 @@ FEW = 800
 # of that square, as Gauss's and Legendre's rule is good for polynomials of twice the degree.
 TAIL_SQUARE = 50.0
 
-# Times by which rounding may grow, per tolerance: it is 1e-11 of the elliptic function at the most.
+# So many times may rounding grow, per tolerance: being some 1e-11 of the elliptic function, it is a tenth of that then.
 MOST_LOST = 1e10
 
 # A path into the hole whose slope is above minus this has not turned; and how well its end has to be met, in u.
@@ -235,7 +235,6 @@ class _Paths:
         rate = self.turn_rate(u[:-2], slope[:-2])
         gone = float(winding(self.spin, np.array([self.start]))[0])
         return self.time * (rule.weights @ rate) - gone, self.time * np.abs(rule.to_tail @ rate).sum(axis=0)
-
 
 
 def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float, beyond: bool = True) -> Places:
