@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
 from .view import View
 
 Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
 Matter = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 """Radius, azimuth in [0, 2 pi) and g."""
 
@@ -92,15 +94,12 @@ class DiskSamples:
             known = np.flatnonzero(np.isfinite(u) if smooth else ~np.isnan(u))
             here = asked[here[known]]
             left[order, here] = False
-            for channel, found in zip(values[order], (self._clipped(u), *others), strict=True):
-                channel[here] = found[known]
+            _put(values[order], here, (self._clipped(u), *others), known)
         traced = np.flatnonzero(left.any(axis=0))
         part, lost[traced] = self._trace_rays(x[traced], y[traced], left[:, traced])
         for order, mine in enumerate(left[:, traced]):
             known = np.flatnonzero(mine)
-            here = traced[known]
-            for channel, found in zip(values[order], part[order], strict=True):
-                channel[here] = found[known]
+            _put(values[order], traced[known], part[order], known)
         return values, lost
 
     def _clipped(self, u: Array) -> Array:
@@ -201,3 +200,9 @@ class DiskSamples:
         else:
             g = circular_redshift(spin, u, values[MOMENTUM], values[ENERGY], retrograde)
         return phi, g
+
+
+def _put(values: Array, here: Index, found: Iterable[Array], known: Index) -> None:
+    """Write those of what was found, by channel, that are known to their places: row by row, which is quicker."""
+    for channel, new in zip(values, found, strict=True):
+        channel[here] = new[known]

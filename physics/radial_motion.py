@@ -12,14 +12,14 @@ that.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .mino import radial_polynomial
 from .quadrature import gauss_legendre, negative_root
-from .radial_path import TAIL, Places, beyond_horizon, winding
+from .radial_path import TAIL, Places, along_parabola, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
 from .rays import Array, Rays
 from .trapped import Barrier
@@ -105,89 +105,49 @@ class _Rule:
 _RULES = {count: _Rule.of(count) for count in NODE_COUNTS}
 
 
-@dataclass(frozen=True)
 class _Paths:
     """Rays from one camera and a time for each; arrays of shape (n,)."""
 
-    spin: float
-    start: float
-    """u at the camera."""
-    function: Weierstrass
-    constants: Array
-    """The properties that follow, shape (9, n)."""
-    time: Array
+    def __init__(self, spin: float, start: float, function: Weierstrass, constants: Array, time: Array) -> None:
+        """`start`: u at the camera; `constants`: all that is told of single rays below, shape (9, n)."""
+        self.spin, self.start, self.function, self.time = spin, start, function, time
+        self._constants = constants
+        self.quartic: Array = constants[:3]
+        """c_2, c_3, c_4 of U, shape (3, n)."""
+        self.slope, self.b, self.drag, inward, self.lowest, self.pace = constants[3:]
+        """du / dlambda at the camera; p_phi; q + (b - a)^2; U's negative root, to some per cent, where rays stay that
+        have gone beyond infinity; how fast the ray's direction turns, radians per Mino time."""
+        self.inward: Mask = inward > 0.0
+        """Whether the ray falls straight in: it ends at the horizon, the others at infinity."""
+        self.highest = beyond_horizon(spin)
+        """u inside the horizon where paths end."""
 
     @classmethod
     def of(cls, rays: Rays, barrier: Barrier) -> _Paths:
         """Return the paths of rays, for no time yet."""
         spin, start = rays.spin, 1.0 / rays.observer.r
-        constants = np.empty((9, len(rays)))
         with np.errstate(all="ignore"):  # impossible rays are not asked for
-            constants[:3] = quartic = radial_polynomial(rays)
-            constants[3] = rays.radial * (start * start)
-            constants[4] = rays.b
-            constants[5] = rays.carter + spin * (spin - 2.0 * rays.b)
-            constants[6] = ~barrier.blocks & (rays.radial >= 0.0)
-            constants[7] = -negative_root(rays)
-            constants[8] = np.sqrt(np.maximum(rays.carter + spin * spin, 0.0))
+            quartic = radial_polynomial(rays)
+            constants = np.stack([
+                *quartic,
+                rays.radial * (start * start),
+                rays.b,
+                rays.carter + spin * (spin - 2.0 * rays.b),
+                ~barrier.blocks & (rays.radial >= 0.0),
+                -negative_root(rays),
+                np.sqrt(np.maximum(rays.carter + spin * spin, 0.0)),
+            ])
             return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
-
-    @property
-    def quartic(self) -> Array:
-        """c_2, c_3, c_4 of U, shape (3, n)."""
-        quartic: Array = self.constants[:3]
-        return quartic
-
-    @property
-    def slope(self) -> Array:
-        """du / dlambda at the camera."""
-        slope: Array = self.constants[3]
-        return slope
-
-    @property
-    def b(self) -> Array:
-        """p_phi."""
-        b: Array = self.constants[4]
-        return b
-
-    @property
-    def drag(self) -> Array:
-        """q + (b - a)^2."""
-        drag: Array = self.constants[5]
-        return drag
-
-    @property
-    def inward(self) -> Mask:
-        """Whether the ray falls straight in: it ends at the horizon, the others at infinity."""
-        inward: Mask = self.constants[6] > 0.0
-        return inward
-
-    @property
-    def lowest(self) -> Array:
-        """U's negative root, to some per cent, where rays stay that have gone beyond infinity."""
-        lowest: Array = self.constants[7]
-        return lowest
-
-    @property
-    def highest(self) -> float:
-        """u inside the horizon where paths end."""
-        return beyond_horizon(self.spin)
-
-    @property
-    def pace(self) -> Array:
-        """How fast the ray's direction turns, radians per Mino time."""
-        pace: Array = self.constants[8]
-        return pace
 
     def for_times(self, chosen: Index, time: Array) -> _Paths:
         """Return the paths of the chosen rays, for these times."""
         return _Paths(
-            self.spin, self.start, self.function.select(chosen), self.constants.take(chosen, axis=1), time
+            self.spin, self.start, self.function.select(chosen), self._constants.take(chosen, axis=1), time
         )
 
     def lasting(self, time: Array) -> _Paths:
         """Return the same paths for other times."""
-        return replace(self, time=time)
+        return _Paths(self.spin, self.start, self.function, self._constants, time)
 
     def motion(self) -> QuarticMotion:
         """Return u from the camera on."""
@@ -310,11 +270,10 @@ def _beyond_end(paths: _Paths, late: Array, rule: _Rule) -> tuple[Array, Array, 
     unwound, error = paths.unwound(rule, u, slope)
     end, steep = u[-1], slope[-1]
     lost = np.where(np.abs(end / paths.highest - 1.0) < END_ERROR, lost, np.inf)  # an end that is none
-    bend = acceleration(paths.quartic, end)
-    late = np.where(bend < 0.0, np.minimum(late, -steep / bend), late)  # beyond its vertex u would come back
+    place, rate, late = along_parabola(end, steep, acceleration(paths.quartic, end), late)
     if paths.spin != 0.0:
         unwound += late * paths.turn_rate(end, steep)
-    return end + late * (steep + 0.5 * late * bend), steep + late * bend, unwound, error, lost
+    return place, rate, unwound, error, lost
 
 
 def _ends(

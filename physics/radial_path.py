@@ -232,6 +232,13 @@ def beyond_horizon(spin: float) -> float:
     return min(outer + BEYOND * (inner - outer), MOST_BEYOND * outer)
 
 
+def along_parabola(u: Array, slope: Array, bend: Array, late: Array) -> tuple[Array, Array, Array]:
+    """Return u and du / dlambda so much later than where u, its slope and its bend are given, and how much that is: no
+    later than the parabola's vertex, or u would come back."""
+    late = np.where(slope * bend < 0.0, np.minimum(late, -slope / bend), late)
+    return u + late * (slope + 0.5 * late * bend), slope + late * bend, late
+
+
 @dataclass(frozen=True)
 class Places:
     """Where rays are at Mino times asked for, shape (k, n), beyond their ends as well: u <= 0 or 1 / u <= r_+."""
@@ -428,10 +435,7 @@ class _Series:
                 series, late = self.select(ray), times[order, ray] - self.duration[ray]
                 end = series.path.end
                 u, slope, bend = series.path.u(end), series.path.u_slope(end), series.path.u_bend(end)
-                # no further than the parabola's vertex, or u would come back
-                late = np.where(slope * bend < 0.0, np.minimum(late, -slope / bend), late)
-                found.u[order, ray] = u + late * (slope + 0.5 * late * bend)
-                found.u_slope[order, ray] = slope + late * bend
+                found.u[order, ray], found.u_slope[order, ray], late = along_parabola(u, slope, bend, late)
                 unwound = series.unwound(u, np.ones_like(end))
                 if path.wound == 1.0 and path.spin != 0.0:
                     unwound += late * series.path.turn_rate(end, series.path.speed(end))

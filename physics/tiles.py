@@ -66,14 +66,12 @@ class Tiles:
         steps = np.arange(self.side)
         return self.column[:, None, None] + steps, self.row[:, None, None] + steps[:, None]
 
-    def put(self, image: NDArray[Any], values: NDArray[Any], where: NDArray[np.bool_] | None = None) -> None:
-        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it and
-        `where`, shape (n, side, side), is true."""
+    def put(self, image: NDArray[Any], values: NDArray[Any]) -> None:
+        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it."""
         for i in range(len(self)):
             top, left = self.row[i], self.column[i]
             place = image[top : top + self.side, left : left + self.side]
-            own = (i, slice(place.shape[0]), slice(place.shape[1]))
-            np.copyto(place, values[own], where=True if where is None else where[own])
+            place[:] = values[i, : place.shape[0], : place.shape[1]]
 
     def within(self, width: int, height: int) -> Tiles:
         """Return the tiles that hold any pixel of the picture."""

@@ -62,18 +62,20 @@ class View:
 
     def light(self, x: Array, y: Array) -> Array:
         """Return where the light seen at map pixel coordinates x, y, shape (n,), runs in the FIDO's frame, (3, n)."""
-        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
-        light, _ = light_in_fido_frame(self._observer, seen, self._camera_to_triad)
-        return light
+        return self._light_and_doppler(x, y)[0]
 
     def light_and_momenta(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Return what `light` does, and the light's energy at infinity and angular momentum for a camera energy of 1,
         shape (n,): Eqs. 7, 8 and 13."""
-        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
-        light, doppler = light_in_fido_frame(self._observer, seen, self._camera_to_triad)
+        light, doppler = self._light_and_doppler(x, y)
         metric = metric_functions(self._spin, self._observer.r, self._observer.theta)
         momentum = doppler * light[2] * metric.varpi
         return light, metric.alpha * doppler + metric.omega * momentum, momentum
+
+    def _light_and_doppler(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return what `light_in_fido_frame` does at map pixel coordinates."""
+        seen = self._camera.directions(x * self._per_pixel, y * self._per_pixel)
+        return light_in_fido_frame(self._observer, seen, self._camera_to_triad)
 
     def edge(self, x: Array, y: Array) -> Array:
         """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""

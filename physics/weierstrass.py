@@ -81,9 +81,7 @@ class Weierstrass:
         doubled, tangent = pole, square  # no longer needed
         for _ in range(doublings):
             # On the curve P'^2 = 4 P^3 - g_2 P - g_3 the tangent, of slope P'' / P', leads to -2 t.
-            np.multiply(value, value, out=tangent)
-            tangent *= 6.0
-            tangent -= self._half_g2
+            self.bend(value, tangent)
             tangent /= slope
             np.multiply(tangent, tangent, out=doubled)
             doubled *= 0.25
@@ -96,9 +94,9 @@ class Weierstrass:
             value, doubled = doubled, value
         return value, slope
 
-    def bend(self, value: Array) -> Array:
-        """Return P'' = 6 P^2 - g_2 / 2 where P is `value`."""
-        bend = value * value
+    def bend(self, value: Array, out: Array | None = None) -> Array:
+        """Return P'' = 6 P^2 - g_2 / 2 where P is `value`, in `out` if given."""
+        bend: Array = np.multiply(value, value, out=out)
         bend *= 6.0
         bend -= self._half_g2
         return bend
@@ -138,21 +136,24 @@ class QuarticMotion:
     def cancellation(self, value: Array, slope: Array) -> Array:
         """Return how much larger than 1 what u - u_0 is a quotient's difference of gets, shape (n,): where u as long
         before is at a pole, so is all of it but the difference."""
-        q = value - self._shift
-        below = 2.0 * q * q - self._fourth
-        size: Array = (np.abs(self.bend * q + self._third) + np.abs(self.slope * slope)) / np.abs(below)
+        _, below, even, odd = self._quotient(value, slope)
+        size: Array = (np.abs(even) + np.abs(odd)) / np.abs(below)
         return size
 
-    def _places(self, value: Array, slope: Array, before: bool = False) -> list[tuple[Array, Array]]:
-        # With u - u_0 = N / D: u' = (N' - (u - u_0) D') / D; P' alone is odd in time.
+    def _quotient(self, value: Array, slope: Array) -> tuple[Array, Array, Array, Array]:
+        """Return q, D, and the parts of N that are even and, to be subtracted, odd in time: u - u_0 = N / D."""
         q = value - self._shift
-        inverse = q * q
-        inverse *= 2.0
-        inverse -= self._fourth
-        np.divide(1.0, inverse, out=inverse)
+        below = q * q
+        below *= 2.0
+        below -= self._fourth
         even = self.bend * q
         even += self._third
-        odd = self.slope * slope
+        return q, below, even, self.slope * slope
+
+    def _places(self, value: Array, slope: Array, before: bool = False) -> list[tuple[Array, Array]]:
+        # u' = (N' - (u - u_0) D') / D; P' alone is odd in time.
+        q, below, even, odd = self._quotient(value, slope)
+        inverse = np.divide(1.0, below, out=below)
         rising = self.bend * slope
         q *= slope
         q *= 4.0
