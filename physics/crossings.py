@@ -67,6 +67,15 @@ class LightAtDisk:
     camera_energy: Array
     """In the camera's frame, on the same scale; > 0."""
 
+    @classmethod
+    def empty(cls, rays: int) -> LightAtDisk:
+        """Return the light of so many rays, yet to be told."""
+        return cls(*(np.full(rays, np.nan) for _ in range(3)))
+
+    def put(self, index: NDArray[np.intp], other: LightAtDisk) -> None:
+        """Take over what the rays of `index` are made of."""
+        self.b[index], self.energy[index], self.camera_energy[index] = other.b, other.energy, other.camera_energy
+
     def g(self, spin: float, u: Array, u_slope: Array, retrograde: bool = False) -> Array:
         """Return nu_camera / nu_matter at crossings, shape (count, n)."""
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -188,14 +188,16 @@ def disk_crossings(
 
     Where `wanted`, shape (count, n), is given, the other crossings may be left out.
     """
-    found = Crossings.empty(count, len(directions))
-    light = LightAtDisk(*(np.empty(len(directions)) for _ in range(3)))
+    found, light = Crossings.empty(count, len(directions)), LightAtDisk.empty(len(directions))
     for index, rays, sign in split_by_energy(spin, observer, directions):
         part = DISK_METHODS[method](
             rays, count, tolerance, max_steps, beyond, None if wanted is None else wanted[:, index]
         )
         if sign < 0.0:
             part.fate[part.fate == Fate.SKY] = Fate.SHADOW
+        own_light = LightAtDisk(rays.b, np.full(len(rays), sign), 1.0 / rays.one_plus_z)
+        if len(rays) == len(directions):  # of one sign all, as everywhere outside the ergosphere
+            return part, own_light
         found.put(index, part)
-        light.b[index], light.energy[index], light.camera_energy[index] = rays.b, sign, 1.0 / rays.one_plus_z
+        light.put(index, own_light)
     return found, light

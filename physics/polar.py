@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,9 +100,14 @@ class PolarMotion:
     def usable(self, tolerance: float) -> NDArray[np.bool_]:
         """Return which rays the series serves to within `tolerance` radians, shape (n,); the rest have q < 0 or little
         angular momentum."""
-        limit = min(ELLIPTICITY_CLASSES[-1], 2.0 * tolerance ** (1.0 / (MOST_TERMS + 1)))
-        usable: NDArray[np.bool_] = (self.base > 0.0) & (self.ellipticity >= 0.0) & (self.ellipticity <= limit)
+        usable: NDArray[np.bool_] = (self.base > 0.0) & (self.ellipticity >= 0.0)
+        usable &= self.ellipticity <= self._largest(tolerance)
         return usable
+
+    @staticmethod
+    def _largest(tolerance: float) -> float:
+        """Return the largest e that the series serves."""
+        return min(ELLIPTICITY_CLASSES[-1], 2.0 * tolerance ** (1.0 / (MOST_TERMS + 1)))
 
     def direction(self, mino_time: Array, rotation: Array, tolerance: float) -> Array:
         """Return the unit vectors after `mino_time`, turned about the axis by `rotation` more, shape (3, n)."""
@@ -164,7 +170,7 @@ class PolarMotion:
         usable = crosses & self.usable(tolerance)
         time, turn = np.full((2, len(rise)), np.nan), np.full((2, len(rise)), np.nan)  # first, and from one to the next
         for chosen, integrals in (
-            (usable, self._series_to_plane),
+            (usable, self._samples_to_plane),
             (crosses & ~usable, self._quadrature_to_plane),
         ):
             if chosen.any():
@@ -180,29 +186,39 @@ class PolarMotion:
         turn[1] += np.copysign(np.pi, self.b)
         return time[0] + order * time[1], np.arctan2(y, x) + turn[0] + order * turn[1]
 
-    def _series_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
-        """Return Mino time and drift to the first crossing and from one to the next, shape (2, n) each."""
+    def _samples_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
+        """Return Mino time and drift to the first crossing and from one to the next, shape (2, n) each.
+
+        The series come from values of 1 / s and f at a few chi: it is their sums at the plane that are wanted, not
+        their terms.
+        """
         part, a2 = self.select(chosen), self.spin * self.spin
-        time, turn = np.empty((2, len(first))), np.zeros((2, len(first)))
-        for members, largest in part._classes():
-            rays = part.select(members)
-            angle = np.stack([first[members], np.full(len(rays.b), np.pi)])
-            v, vertical = rays.triad[0, 2], rays.triad[1, 2] * rays.tangent_theta
-            swing = 0.5 * a2 / rays.mean
-            start = swing * (vertical * vertical - v * v), 2.0 * swing * vertical * v
-            speeds = _speed_series(rays.ellipticity, largest, tolerance)
-            scale = np.sqrt(rays.mean)
-            time[:, members] = speeds[0] * angle / scale
-            time[0, members] -= _harmonics(speeds, *start) / scale
-            if a2 > 0.0:
-                drift = _turn_series(rays.pole_speed / scale, rays.ellipticity, len(speeds))
-                path = drift[0] * angle
-                path[0] -= _harmonics(drift, *start)
-                turn[:, members] = path * (a2 * rays.b / (rays.pole_speed * rays.mean))
-        return time, turn
+        cosines, to_weights = _plane_samples(_terms(self._largest(tolerance), tolerance) + 1)
+        # e cos(2 chi) and e sin(2 chi) at the camera.
+        v, vertical = part.triad[0, 2], part.triad[1, 2] * part.tangent_theta
+        swing = 0.5 * a2 / part.mean
+        whole = 1.0 / np.maximum(part.ellipticity, np.finfo(float).tiny)
+        cos, sin = swing * (vertical * vertical - v * v) * whole, 2.0 * swing * vertical * v * whole
+        sines = [np.zeros_like(sin), sin]
+        for _ in range(len(cosines) - 2):
+            sines.append(2.0 * cos * sines[-1] - sines[-2])
+        weights = to_weights @ np.stack(sines[1 : len(cosines)])
+
+        def to_plane(samples: Array) -> tuple[Array, Array]:
+            mean = samples.mean(axis=0)
+            return mean * first - (weights * samples).sum(axis=0), mean * np.pi
+
+        scale = np.sqrt(part.mean)
+        root = np.sqrt(1.0 - cosines * part.ellipticity)
+        speeds = 1.0 / root  # sqrt(M) / s
+        time = np.stack(to_plane(speeds)) / scale
+        if a2 == 0.0:
+            return time, np.zeros_like(time)
+        speeds /= root + part.pole_speed / scale  # M / (s (s + s_1))
+        return time, np.stack(to_plane(speeds)) * (a2 * part.b / (part.pole_speed * part.mean))
 
     def _quadrature_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
-        """Return what `_series_to_plane` does, by Gauss-Legendre quadrature of 1 / s and f over chi.
+        """Return what `_samples_to_plane` does, by Gauss-Legendre quadrature of 1 / s and f over chi.
 
         1 / s is singular at sin(chi) = +-i eps, eps^2 = A / (a^2 w_+), which chi = eps sinh(t) keeps away.
         """
@@ -281,11 +297,26 @@ class PolarMotion:
         return np.stack([x * cos - y * sin, x * sin + y * cos, z])
 
 
-def _speed_series(ellipticity: Array, largest: float, tolerance: float) -> list[Array]:
-    """Return the Fourier series of sqrt(M) / s = (1 - e cos x)^(-1/2), with as many terms as are needed."""
+def _terms(largest: float, tolerance: float) -> int:
+    """Return how many terms the series need beyond the first, for e up to `largest`."""
     terms = 0
     while terms < MOST_TERMS and (0.5 * largest) ** (terms + 1) > 0.1 * tolerance:
         terms += 1
+    return terms
+
+
+@cache
+def _plane_samples(count: int) -> tuple[Array, Array]:
+    """Return cos(x), shape (count, 1), at places x = 2 chi that determine count terms of a series in cos(k x), and the
+    weights of values there, shape (count, count - 1), for each sin(k x) in the sum of c_k sin(k x) / (2 k)."""
+    places = (np.arange(count) + 0.5) * (np.pi / count)
+    order = np.arange(1, count)
+    return np.cos(places)[:, None], np.cos(places[:, None] * order) / (count * order)
+
+
+def _speed_series(ellipticity: Array, largest: float, tolerance: float) -> list[Array]:
+    """Return the Fourier series of sqrt(M) / s = (1 - e cos x)^(-1/2), with as many terms as are needed."""
+    terms = _terms(largest, tolerance)
     powers: list[float] = [1.0]
     for m in range(1, terms + EXTRA_POWERS + 1):
         powers.append(powers[-1] * (2 * m - 1) / (2 * m))
