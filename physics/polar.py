@@ -107,7 +107,7 @@ class PolarMotion:
     @staticmethod
     def _largest(tolerance: float) -> float:
         """Return the largest e that the series serves."""
-        return min(ELLIPTICITY_CLASSES[-1], 2.0 * tolerance ** (1.0 / (MOST_TERMS + 1)))
+        return min(ELLIPTICITY_CLASSES[-1], 2.0 * math.pow(tolerance, 1.0 / (MOST_TERMS + 1)))
 
     def direction(self, mino_time: Array, rotation: Array, tolerance: float) -> Array:
         """Return the unit vectors after `mino_time`, turned about the axis by `rotation` more, shape (3, n)."""
