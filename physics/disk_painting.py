@@ -54,14 +54,14 @@ SLIM = 8.0
 class DiskPainting:
     """The passes of a disk in the making."""
 
-    def __init__(self, parameters: WarpMapParameters) -> None:
+    def __init__(self, parameters: WarpMapParameters, view: View) -> None:
         assert parameters.disk is not None
         self._interpolation = parameters.interpolation
         self._inner, self._outer = parameters.disk.radii(parameters.spin)
         self._crossings = parameters.disk.crossings
         self._width, self._height = parameters.map_size
-        self._view = View(parameters)
-        self._samples = DiskSamples(parameters, self._view)
+        self._view = view
+        self._samples = DiskSamples(parameters, view)
         self._bent = BentU(self._inner, self._outer)
         self._planes = DiskPlanes(self._crossings, self._width, self._height, self._bent)
         self._tracing = DiskTracing(

@@ -146,7 +146,7 @@ class DiskSamples:
         needs = Needs(
             self._inner, self._outer, self._tolerance, pixel, PIXEL_ERROR, PLACE_ERROR * self._parameters.interpolation
         )
-        self._tables = ring_tables(self._parameters.spin, observer, orders, needs)
+        self._tables = ring_tables(self._parameters.spin, observer, orders, needs, self._view.edge_about)
         self.rays += sum(table.rays for table in self._tables.values())
 
     def _sees_shadow(self, r: float) -> bool:

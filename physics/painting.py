@@ -42,10 +42,13 @@ Mask = NDArray[np.bool_]
 class Painting:
     """A warp map in the making; with a table of the same place it traces only what that leaves open."""
 
-    def __init__(self, parameters: WarpMapParameters, table: SkyTable | None = None) -> None:
+    def __init__(
+        self, parameters: WarpMapParameters, table: SkyTable | None = None, view: View | None = None
+    ) -> None:
+        """`view`: of these parameters, if there is one already."""
         self._parameters = parameters
         self._table = table
-        self._view = View(parameters)
+        self._view = View(parameters) if view is None else view
         self._width, self._height = parameters.map_size
         shape = (self._height, self._width)
         self._theta, self._phi, self._visibility = (np.zeros(shape, np.float32) for _ in range(3))

@@ -47,6 +47,8 @@ ENOUGH_ROWS = 0.75
 REACH = (0.7, 1.5)
 # Error of the edge, in pixels, as long as the last image is the third; each that follows is thinner by up to e^pi.
 EDGE_ERROR = 1e-3
+# And how far from where it is known to be about it is looked for first, in pixels.
+EDGE_REACH = 0.25
 THIRD = 2
 
 # Position angles at which the scale is looked for, and distances from the edge there: shares of its own distance from
@@ -254,13 +256,16 @@ def _falls_to(u: Array, level: float) -> tuple[Array, Index]:
     return np.where(found, first + part, np.nan), first
 
 
-def ring_tables(spin: float, observer: Observer, orders: Sequence[int], needs: Needs) -> dict[int, RingTable]:
-    """Return tables of some crossings, counted from 0, by their order.
+def ring_tables(
+    spin: float, observer: Observer, orders: Sequence[int], needs: Needs, edge_about: Array
+) -> dict[int, RingTable]:
+    """Return tables of some crossings, counted from 0, by their order; for `edge_about` see `View`.
 
     The observer's motion does not matter: the tables are of its FIDO's sky. It must be outside the ergosphere, where
     all rays have positive energy.
     """
-    sky = _Sky(spin, Observer.fido(observer.r, observer.theta, observer.phi), max(orders) + 1, needs)
+    fido = Observer.fido(observer.r, observer.theta, observer.phi)
+    sky = _Sky(spin, fido, max(orders) + 1, needs, edge_about)
     few = sky.evenly(SCALE_ANGLES)
     edge = sky.edge[few]
     distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
@@ -291,14 +296,16 @@ def ring_tables(spin: float, observer: Observer, orders: Sequence[int], needs: N
 class _Sky:
     """A FIDO's sky around the shadow: where its edge is, and where rays along it cross the plane."""
 
-    def __init__(self, spin: float, fido: Observer, count: int, needs: Needs) -> None:
+    def __init__(self, spin: float, fido: Observer, count: int, needs: Needs, edge_about: Array) -> None:
         """`count`: how many crossings of a ray are of interest."""
         self._spin, self._fido, self._needs, self._count = spin, fido, needs, count
         self._aside, self._up = cos_sin(
             np.linspace(0.0, 2.0 * math.pi, ANGLES[1], endpoint=False, dtype=np.float64)
         )
         error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
-        self.edge = edge_angles(spin, fido, self._aside, self._up, error)
+        place = np.arange(ANGLES[1]) * (len(edge_about) / ANGLES[1])
+        near = np.interp(place, np.arange(len(edge_about)), edge_about, period=len(edge_about))
+        self.edge = edge_angles(spin, fido, self._aside, self._up, error, (near, EDGE_REACH * needs.pixel))
         """How far the edge is from the hole's direction at the most position angles there are."""
 
     def evenly(self, angles: int) -> Index:

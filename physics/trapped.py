@@ -135,17 +135,28 @@ def around_hole(away: Array, aside: Array, up: Array) -> Array:
     return by_component(-cosine, sine * aside, sine * up)
 
 
-def edge_angles(spin: float, fido: Observer, aside: Array, up: Array, error: float) -> Array:
+def edge_angles(
+    spin: float, fido: Observer, aside: Array, up: Array, error: float, about: tuple[Array, float] | None = None
+) -> Array:
     """Return the angles from the hole's direction to the shadow's edge in a FIDO's sky, radians, by bisection.
 
     The shadow surrounds the hole's direction, and each great circle from there to the opposite point, which is sky,
     crosses its edge once. The answer lies on the sky's side, within `error` radians; for `aside` and `up` see
-    `around_hole`.
+    `around_hole`. `about`: where the edge is looked for first, if that is known, and how far on both sides.
     """
+
+    def is_sky(away: Array) -> NDArray[np.bool_]:
+        return edge_function(rays_from_triad(spin, fido, around_hole(away, aside, up))) > 0.0
+
     low, high = np.zeros(len(aside)), np.full(len(aside), math.pi)
-    for _ in range(math.ceil(math.log2(math.pi / error))):
+    if about is not None:
+        near, reach = about
+        first, last = np.maximum(near - reach, low), np.minimum(near + reach, high)
+        if not is_sky(first).any() and is_sky(last).all():
+            low, high = first, last
+    for _ in range(math.ceil(math.log2((high - low).max() / error))):
         middle = 0.5 * (low + high)
-        sky = edge_function(rays_from_triad(spin, fido, around_hole(middle, aside, up))) > 0.0
+        sky = is_sky(middle)
         low, high = np.where(sky, low, middle), np.where(sky, middle, high)
     return high
 

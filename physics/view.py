@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,11 +126,15 @@ class View:
 
     def outline(self) -> tuple[Array, Array]:
         """Return map pixel coordinates along the shadow's edge, in order, shape (n,); NaN where not in view."""
+        aside, up = _around(len(self.edge_about))
+        return self._pixels(around_hole(self.edge_about, aside, up))
+
+    @cached_property
+    def edge_about(self) -> Array:
+        """About how far the shadow's edge is from the hole's direction at equal steps of position angle, radians."""
         count = math.ceil(OUTLINE_DENSITY * math.sqrt((self._camera.width + self._camera.height) / self._per_pixel))
-        aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
         fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
-        away = edge_angles(self._spin, fido, aside, up, OUTLINE_ERROR * self._pixel_angle)
-        return self._pixels(around_hole(away, aside, up))
+        return edge_angles(self._spin, fido, *_around(count), OUTLINE_ERROR * self._pixel_angle)
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""
@@ -141,5 +146,10 @@ class View:
         seen /= (1.0 + beta * along)[:, None]
         x, y = self._camera.pixels(seen @ self._camera_to_triad.T)
         return x / self._per_pixel, y / self._per_pixel
+
+
+def _around(count: int) -> tuple[Array, Array]:
+    """Return cosine and sine of so many position angles at equal steps."""
+    return cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
 
 

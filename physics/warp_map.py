@@ -16,6 +16,7 @@ from .painting import Painting
 from .shot import WarpMapParameters
 from .sky_table import SkyTable
 from .tracer import Cancel, Progress, drain
+from .view import View
 
 Image = NDArray[np.float32]
 
@@ -83,14 +84,15 @@ def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> 
         Before the first step, when no map can be made from these parameters.
     """
     parameters.validate()
-    painting = Painting(parameters, table)
+    view = View(parameters)
+    painting = Painting(parameters, table, view)
     metadata: dict[str, Any] = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
     if parameters.disk is None:
         yield from painting.steps()
         return WarpMap(*painting.planes, {**metadata, "counts": painting.counts()})
     for fraction in painting.steps():
         yield 0.5 * fraction
-    disk = DiskPainting(parameters)
+    disk = DiskPainting(parameters, view)
     for fraction in disk.steps():
         yield 0.5 + 0.5 * fraction
     metadata["counts"] = {**painting.counts(), **disk.counts()}
