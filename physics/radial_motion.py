@@ -38,6 +38,8 @@ LONGEST_TIMES = (1.0, 2.6)
 
 # Fewer pairs than this are better served by more nodes than by a call of their own.
 FEW = 800
+# Fewer rays that have fallen in than this are followed to their ends with the next.
+FEW_ENDED = 150
 
 # What the highest coefficients may amount to, squared, in units of the tolerance: the error was found to be a hundredth
 # of that square, as Gauss's and Legendre's rule is good for polynomials of twice the degree.
@@ -212,7 +214,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
     span, time_of = span.ravel(), times.ravel()
     parts = [values.reshape(-1) for values in (found.u, found.u_slope, found.unwound)]
     for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
-        follow = beyond and count > NODE_COUNTS[0]  # the few of the first go on with the others
+        fewest = 1 if count > NODE_COUNTS[0] else FEW_ENDED  # a few of the first go on with the others
         pairs = np.flatnonzero((span <= most) & ~known)
         if len(pairs) < FEW and count != NODE_COUNTS[-1]:
             continue
@@ -221,7 +223,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
             ray, time = some % len(rays), time_of[some]
             with np.errstate(all="ignore"):  # beyond a path's end there may be poles; what is not finite is not known
                 followed = every.for_times(ray, np.minimum(time, longest[ray]))
-                *there, known[some], ended = _places(followed, time, _RULES[count], tolerance, follow)
+                *there, known[some], ended = _places(followed, time, _RULES[count], tolerance, fewest if beyond else None)
             for values, new in zip(parts, there, strict=True):
                 values[some] = new
             if not beyond:
@@ -234,7 +236,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
 
 
 def _places(
-    paths: _Paths, time: Array, rule: _Rule, tolerance: float, follow: bool
+    paths: _Paths, time: Array, rule: _Rule, tolerance: float, fewest: int | None
 ) -> tuple[Array, Array, Array, Mask, Index]:
     """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, where that is known,
     and which rays have fallen in before for certain: only with `follow` is it known of these."""
@@ -252,7 +254,7 @@ def _places(
     # Next to the critical curve rays hover, and rounding tells the sign of their slope.
     left = outside | (paths.inward & (slope <= -HOVERING))
     index = np.flatnonzero(left.any(axis=0))
-    if follow and len(index):
+    if fewest is not None and len(index) >= fewest:
         ends, known[index] = _ends(paths.for_times(index, paths.time[index]), rule, u, slope, left, index, tolerance)
         further = time[index] - ends.time
         place[index], rate[index], unwound[index], error[index], lost[index] = _beyond_end(ends, further, rule)
