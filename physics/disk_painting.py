@@ -23,12 +23,11 @@ from .annulus import near_annulus
 from .disk_pass import DiskPass
 from .disk_pixels import DiskTracing
 from .disk_planes import BentU, Channels, DiskPlanes, mean_matter
-from .disk_samples import PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
+from .disk_samples import MOMENTUM, PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
 from .painting import pool
 from .rays import Array
 from .ring_painting import WEIGHTS, RingPainting, RingPixels, TileSurvey
 from .shot import WarpMapParameters
-from .sky_table import nearest_turn
 from .tiles import TAIL_SHARE, TILE_SIDES, Tiles, coefficients_of, sample_places, sides_for, tails_of, tiles_of
 from .tracer import BLOCK_SIZE
 from .view import View
@@ -169,8 +168,7 @@ class DiskPainting:
     def _settle_order(self, order: int, tiles: Tiles, sampled: Array, marked: Mask) -> Mask:
         """Fill those tiles that samples of one crossing, shape (channels, n, points, points), determine; return which
         are filled or empty."""
-        azimuth = sampled[PHI]
-        sampled[PHI] = azimuth[:, :1, :1] + nearest_turn(azimuth - azimuth[:, :1, :1])
+        sampled[PHI] = _continuous(sampled[PHI], sampled[MOMENTUM] > 0.0)
         u = sampled[U]
         bent = self._bent.bent(u)
         coefficients = coefficients_of(np.stack([bent, *sampled[PHI:]], axis=1))
@@ -247,6 +245,22 @@ class DiskPainting:
         one = (radius[0], phi[0], g[0]) if len(radius) == 1 else mean_matter(radius, phi, g, WEIGHTS[:, None])
         self._planes.write(order, (pixels.column[known], pixels.row[known]), one, pixels.share[known])
         return known
+
+
+def _continuous(azimuth: Array, positive: Mask) -> Array:
+    """Return the azimuths of tiles, shape (n, points, points), without the whole turns that they jump by where the
+    angular momentum changes sign, and from the first circle on."""
+    whole = 2.0 * math.pi
+    azimuth = azimuth - whole * np.floor(azimuth[:, :1, :1] / whole)
+    mixed = np.flatnonzero(positive.any(axis=(1, 2)) & ~positive.all(axis=(1, 2)))
+    if len(mixed):
+        values, sign = azimuth[mixed], positive[mixed]
+        turned = np.diff(sign, axis=2) * whole * np.round(np.diff(values, axis=2) / whole)
+        values[:, :, 1:] -= np.cumsum(turned, axis=2)
+        turned = np.diff(sign[:, :, :1], axis=1) * whole * np.round(np.diff(values[:, :, :1], axis=1) / whole)
+        values[:, 1:] -= np.cumsum(turned, axis=1)
+        azimuth[mixed] = values
+    return azimuth
 
 
 def _joined(tiles: Tiles, wanted: Mask, more: Tiles, order: int) -> tuple[Tiles, Mask]:

@@ -26,6 +26,9 @@ MatterOf = Callable[[Channels], Matter]
 # u is bent from this many times its value at the inner rim on.
 BENT_FROM = 2.0
 
+# Tiles of which this share is wholly covered are written whole.
+DENSE = 0.3
+
 # How much steeper than at the places looked at a tile may be between them.
 STEEPER = 1.2
 
@@ -113,17 +116,32 @@ class DiskPlanes:
         self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
         """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach` as above."""
-        columns, rows = tiles.pixels()
-        inside = (columns < self._width) & (rows < self._height)
-        where = (rows * self._width + columns).ravel()
-        off = np.maximum(self._bent.low - values[U], values[U] - self._bent.high)
-        near = inside & (np.abs(off) < reach[:, None, None])
-        wholly = np.flatnonzero(inside & (off < 0.0) & ~near)
+        u, reach = values[U], reach[:, None, None]
+        off = np.maximum(self._bent.low - u, u - self._bent.high)
+        wholly = off <= -reach
+        rim, where = self._in_picture(tiles, np.flatnonzero((off < reach) != wholly))
         channels = values.reshape(len(values), -1)
-        self._put(order, where.take(wholly), matter(channels.take(wholly, axis=1)), 1.0)
-        rim = np.flatnonzero(near)
         right, below = slopes(values, rim)
-        self._rims[order, matter].append((where.take(rim), channels.take(rim, axis=1), right, below))
+        self._rims[order, matter].append((where, channels.take(rim, axis=1), right, below))
+        if np.count_nonzero(wholly) < DENSE * wholly.size:
+            inside, where = self._in_picture(tiles, np.flatnonzero(wholly))
+            self._put(order, where, matter(channels.take(inside, axis=1)), 1.0)
+            return
+        np.clip(u, self._bent.low, self._bent.high, out=u)
+        with np.errstate(all="ignore"):  # off the disk there is no matter
+            found = matter(values)
+        for plane, channel in zip(self.planes[order], (*found, wholly), strict=True):
+            tiles.put(plane, np.where(wholly, channel, np.float32(0.0)))
+
+    def _in_picture(self, tiles: Tiles, places: Index) -> tuple[Index, Index]:
+        """Return those of some places, given by their numbers in (n, side, side), that are in the picture, and their
+        numbers there."""
+        tile, inside = np.divmod(places, tiles.side * tiles.side)
+        row, column = np.divmod(inside, tiles.side)
+        row, column = row + tiles.row[tile], column + tiles.column[tile]
+        where = row * self._width + column
+        known = (row < self._height) & (column < self._width)
+        return (places, where) if known.all() else (places[known], where[known])
 
     def fill_rims(self) -> None:
         """Write the pixels next to the rims in the tiles filled: all at once, as there are few in each."""

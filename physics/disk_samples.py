@@ -15,7 +15,9 @@ from .orbiting_matter import circular_redshift, redshift_factor
 from .painting import in_circle
 from .radial_path import winding
 from .rays import Array
-from .ring_table import REACH, Needs, RingTable, ring_tables
+from .ring_grid import Needs
+from .ring_table import RingTable
+from .ring_tracing import REACH, ring_tables
 from .shot import WarpMapParameters
 from .sky_table import position_angles
 from .tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate

@@ -56,6 +56,8 @@ def _by_steps(
         other = cross_plane(rays, count, tolerance, beyond=True)
         for name in ("u", "u_slope", "unwound"):
             np.copyto(getattr(found, name), getattr(other, name), where=ended)
+        turns = np.round((other.unwound - found.unwound) / (2.0 * np.pi))
+        found.unwound[:] += 2.0 * np.pi * np.where(np.isfinite(turns), turns, 0.0)  # which steps do not count
     return found
 
 

@@ -152,8 +152,8 @@ class PolarMotion:
         Returns
         -------
         mino_time, azimuth : ndarray, shape (count, n)
-            The azimuth is unwrapped and lacks psi; both are NaN for rays that never cross: q < 0, or motion in the
-            plane for ever.
+            The azimuth lacks psi, and counts turns: from ray to ray it jumps only where b changes sign. Both are NaN
+            for rays that never cross: q < 0, or motion in the plane for ever.
         """
         with np.errstate(invalid="ignore"):
             height, rise = self.triad[0, 2], self.triad[1, 2] * self.tangent_theta
@@ -178,13 +178,12 @@ class PolarMotion:
                 time[:, those], turn[:, those] = integrals(those, first[those], tolerance)
         if not height:
             along = np.full(len(rise), -1.0)
-        x, y = (
-            self.triad[0, i] * along + (self.triad[1, i] * along_theta + self.triad[2, i] * along_phi) * aside
-            for i in (0, 1)
-        )
+        # Counted from the camera's meridian the first is at most half a turn away, in the sense of b.
+        x, y = along_theta * aside * self.triad[0, 2] - along * self.triad[1, 2], along_phi * aside
+        camera = math.atan2(-self.triad[2, 0], self.triad[2, 1])
         order = np.arange(count)[:, None]
         turn[1] += np.copysign(np.pi, self.b)
-        return time[0] + order * time[1], np.arctan2(y, x) + turn[0] + order * turn[1]
+        return time[0] + order * time[1], camera + np.arctan2(y, x) + turn[0] + order * turn[1]
 
     def _samples_to_plane(self, chosen: Indices, first: Array, tolerance: float) -> tuple[Array, Array]:
         """Return Mino time and drift to the first crossing and from one to the next, shape (2, n) each.

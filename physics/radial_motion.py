@@ -214,7 +214,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
     span, time_of = span.ravel(), times.ravel()
     parts = [values.reshape(-1) for values in (found.u, found.u_slope, found.unwound)]
     for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
-        fewest = 1 if count > NODE_COUNTS[0] else FEW_ENDED  # a few of the first go on with the others
+        fewest = (1 if count > NODE_COUNTS[0] else FEW_ENDED) if beyond else None  # few of the first go on with others
         pairs = np.flatnonzero((span <= most) & ~known)
         if len(pairs) < FEW and count != NODE_COUNTS[-1]:
             continue
@@ -223,7 +223,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
             ray, time = some % len(rays), time_of[some]
             with np.errstate(all="ignore"):  # beyond a path's end there may be poles; what is not finite is not known
                 followed = every.for_times(ray, np.minimum(time, longest[ray]))
-                *there, known[some], ended = _places(followed, time, _RULES[count], tolerance, fewest if beyond else None)
+                *there, known[some], ended = _places(followed, time, _RULES[count], tolerance, fewest)
             for values, new in zip(parts, there, strict=True):
                 values[some] = new
             if not beyond:

@@ -22,102 +22,36 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .crossings import cross_plane
-from .observer import Observer
-from .rays import Array, rays_from_triad
+from .rays import Array
+from .ring_grid import Grid, Needs, continuous
 from .sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
-from .sphere import cos_sin
-from .trapped import around_hole, edge_angles
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Pairs = NDArray[np.complex128]
 """Two numbers as one, to be looked up together."""
 
-# The step of asinh(delta / w), and the fewest and most position angles of the grid: powers of two. More are taken where
-# the table does not answer for this share of the disk.
-STEP = 0.25
-ANGLES = (128, 256)
-ENOUGH = 0.9
+# The column that begins the first cell: its neighbours serve it, and the first of all tells the errors alone.
+FIRST_CELL = 2
 
 # Where a band's rims are not well known at this share of the position angles, it is no band.
 ENOUGH_ROWS = 0.75
 
-# How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
-REACH = (0.7, 1.5)
-# Error of the edge, in pixels, as long as the last image is the third; each that follows is thinner by up to e^pi.
-EDGE_ERROR = 1e-3
-# And how far from where it is known to be about it is looked for first, in pixels.
-EDGE_REACH = 0.25
-THIRD = 2
-
-# Position angles at which the scale is looked for, and distances from the edge there: shares of its own distance from
-# the hole's direction, from the largest to the smallest.
-SCALE_ANGLES = 16
-SHARES = np.geomspace(1.0, 1e-9, 28)
-
-# Of what is found there, waves up to this are kept: steps between the distances make the others.
-MOST_WAVES = 5
-
-# A table holds the image and so much of asinh(delta / w) on both sides.
-BAND_MARGIN = 1.5
-
 # Rounds of Newton's method that find a rim between two columns, where it is nearly straight.
 RIM_ROUNDS = 4
-
-# u changes by this share of 1 / r at the inner rim over the scale.
-SCALE_CHANGE = 0.3
 
 # A node so far off the disk, in units of how uncertain it is, need not be known if its neighbours are off as well.
 OFF_MARGIN = 4.0
 
 
-@dataclass(frozen=True)
-class Needs:
-    """What a picture of a disk asks of its tables."""
-
-    inner: float
-    outer: float
-    tolerance: float
-    """Of tracing, radians."""
-    pixel: float
-    """The angle between neighbouring pixels in the middle of the picture, radians."""
-    pixel_error: float
-    """Share of the change from pixel to pixel that interpolation may be wrong by."""
-    place_error: float
-    """Error of place, relative to the radius, and of azimuth, radians, that is small in any case."""
-
-
-@dataclass(frozen=True)
-class _Coordinates:
-    """A grid around the shadow's edge, at equal steps of position angle: delta = scale sinh(low + step j)."""
-
-    edge: Array
-    """Shape (angles,), as are the next three."""
-    scale: Array
-    low: Array
-    step: Array
-    columns: int
-
-    @property
-    def stretched(self) -> Array:
-        """asinh(delta / scale), shape (angles, columns)."""
-        return self.low[:, None] + self.step[:, None] * np.arange(self.columns)
-
-    @property
-    def delta(self) -> Array:
-        """Distances from the edge, shape (angles, columns)."""
-        delta: Array = self.scale[:, None] * np.sinh(self.stretched)
-        return delta
-
-
 class RingTable:
     """Where rays around the shadow's edge cross the plane for the k-th time, for one camera's place."""
 
-    def __init__(self, coordinates: _Coordinates, values: Array, needs: Needs) -> None:
+    def __init__(self, coordinates: Grid, values: Array, needs: Needs) -> None:
         """`values`: u, unwound azimuth and du / dlambda, shape (3, angles, columns)."""
         self._angles = len(coordinates.edge)
-        channels, good, placed = _served(values, coordinates, needs)
+        azimuth, self._beyond, once_round = continuous(values[1])
+        channels, good, placed = _served((values[0], azimuth, values[2]), once_round, coordinates, needs)
         self._columns = int(good.shape[1])
         around = np.arange(AROUND[0], self._angles + AROUND[-1]) % self._angles
         # The outermost columns served to tell the errors alone.
@@ -129,8 +63,8 @@ class RingTable:
         on_disk = (u > self._rims[0]) & (u < self._rims[1])
         self.answered = float(good[on_disk].mean()) if on_disk.any() else 1.0
         """The share of the table's places on the disk that it answers for."""
-        cells = np.lib.stride_tricks.sliding_window_view(good, (len(AROUND), len(AROUND)))
-        self._good = np.ascontiguousarray(cells.all(axis=(2, 3))).ravel()
+        self._open: Mask = _cells(~on_disk | good)
+        self._good = np.ascontiguousarray(~_cells(good)).ravel()
         placed = placed[-AROUND[0] :][: self._angles]
         rims = [_Rim.of(values[0][:, 1:-1], placed, level, grid, needs) for level in self._rims]
         known = rims[0].known & rims[1].known
@@ -147,6 +81,17 @@ class RingTable:
     def rays(self) -> int:
         """How many rays it was made of, but for those that told the scale."""
         return self._angles * (self._columns + 2)
+
+    def left(self) -> Mask:
+        """Return which places of a grid twice as fine, shape (2 angles, 2 columns - 1), have to be known for all of the
+        disk to be, and are not yet."""
+        wanted = np.zeros((2 * self._angles, 2 * self._columns + 3), dtype=bool)
+        row, column = np.nonzero(self._open)
+        for down in range(3):
+            for right in range(3):
+                wanted[(2 * row + down) % len(wanted), 2 * (column + FIRST_CELL) + right] = True
+        wanted[::2, ::2] = False
+        return wanted
 
     def places(self, away: Array, angle: Array, channels: int) -> Array:
         """Return the first few channels at `position_angles`, shape (channels, n).
@@ -175,6 +120,8 @@ class RingTable:
         unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
         unknown &= (result[0] >= self._rims[0]) & (result[0] <= self._rims[1])
         result[0, unknown] = np.nan
+        if self._beyond:
+            result[1] -= self._beyond * (angle > math.pi)
         result[0, ~inside] = np.where(before[~inside], np.inf, -np.inf) if self.confined else np.nan
         return result
 
@@ -195,6 +142,14 @@ class RingTable:
             for total, each in zip(sums, rows, strict=True):
                 total += weight * each.take(index)
         return row, across, _unpaired(sums)
+
+
+def _cells(good: Mask) -> Mask:
+    """Return which cells, shape (angles, cells), have any of the nodes not good that they are interpolated among."""
+    for axis, size in enumerate(good.shape):
+        last = size - len(AROUND) + 1
+        good = np.logical_and.reduce([good[(slice(None),) * axis + (slice(i, last + i),)] for i in range(len(AROUND))])
+    return ~good
 
 
 def _pairs(values: Sequence[Array]) -> list[Pairs]:
@@ -256,152 +211,6 @@ def _falls_to(u: Array, level: float) -> tuple[Array, Index]:
     return np.where(found, first + part, np.nan), first
 
 
-def ring_tables(
-    spin: float, observer: Observer, orders: Sequence[int], needs: Needs, edge_about: Array
-) -> dict[int, RingTable]:
-    """Return tables of some crossings, counted from 0, by their order; for `edge_about` see `View`.
-
-    The observer's motion does not matter: the tables are of its FIDO's sky. It must be outside the ergosphere, where
-    all rays have positive energy.
-    """
-    fido = Observer.fido(observer.r, observer.theta, observer.phi)
-    sky = _Sky(spin, fido, max(orders) + 1, needs, edge_about)
-    few = sky.evenly(SCALE_ANGLES)
-    edge = sky.edge[few]
-    distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
-    (scouted,) = sky.cross([(edge[:, None] + distances, few, list(orders))])
-    drafts = {order: _Draft.of(u, distances, edge, needs) for order, u in zip(orders, scouted[0], strict=True)}
-    found: dict[int, Array] = {}
-    tables: dict[int, RingTable] = {}
-    waiting, angles = list(orders), ANGLES[0]
-    while waiting:
-        index = sky.evenly(angles)
-        rows = slice(1, None, 2) if found else slice(None)  # every other row is there already, but for the first time
-        grids = {order: drafts[order].coordinates(sky.edge[index]) for order in waiting}
-        asked = [((grid.edge[:, None] + grid.delta)[rows], index[rows], [order]) for order, grid in grids.items()]
-        for order, new in zip(waiting, sky.cross(asked), strict=True):
-            values = np.empty((3, angles, grids[order].columns))
-            values[:, rows] = new[:, 0]
-            if order in found:
-                values[:, ::2] = found[order]
-            found[order] = values
-            tables[order] = RingTable(grids[order], values, needs)
-        waiting = [order for order in waiting if tables[order].answered < ENOUGH]
-        angles *= 2
-        if angles > ANGLES[1]:
-            break
-    return tables
-
-
-class _Sky:
-    """A FIDO's sky around the shadow: where its edge is, and where rays along it cross the plane."""
-
-    def __init__(self, spin: float, fido: Observer, count: int, needs: Needs, edge_about: Array) -> None:
-        """`count`: how many crossings of a ray are of interest."""
-        self._spin, self._fido, self._needs, self._count = spin, fido, needs, count
-        self._aside, self._up = cos_sin(
-            np.linspace(0.0, 2.0 * math.pi, ANGLES[1], endpoint=False, dtype=np.float64)
-        )
-        error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
-        place = np.arange(ANGLES[1]) * (len(edge_about) / ANGLES[1])
-        near = np.interp(place, np.arange(len(edge_about)), edge_about, period=len(edge_about))
-        self.edge = edge_angles(spin, fido, self._aside, self._up, error, (near, EDGE_REACH * needs.pixel))
-        """How far the edge is from the hole's direction at the most position angles there are."""
-
-    def evenly(self, angles: int) -> Index:
-        """Return the numbers of so many of these position angles at equal steps."""
-        return np.arange(0, ANGLES[1], ANGLES[1] // angles)
-
-    def cross(self, asked: list[tuple[Array, Index, list[int]]]) -> list[Array]:
-        """Return u, unwound azimuth and du / dlambda, shape (3, orders, rows, distances), for each that is asked for.
-
-        Asked for are angles from the hole's direction, shape (rows, distances); the numbers of the rows' position
-        angles; and the orders of the crossings.
-        """
-        looking, wanted = [], []
-        for away, index, orders in asked:
-            looking.append(around_hole(away, self._aside[index, None], self._up[index, None]).reshape(-1, 3))
-            here = np.zeros((self._count, away.size), dtype=bool)
-            here[orders] = True
-            wanted.append(here)
-        light, every = rays_from_triad(self._spin, self._fido, np.concatenate(looking)), np.concatenate(wanted, axis=1)
-        crossings = cross_plane(light, self._count, self._needs.tolerance, beyond=True, wanted=every)
-        values = np.stack([crossings.u, crossings.unwound, crossings.u_slope])
-        ends = np.cumsum([away.size for away, *_ in asked])
-        parts = np.split(values, ends[:-1], axis=2)
-        return [
-            part[:, orders].reshape(3, len(orders), *away.shape)
-            for part, (away, _, orders) in zip(parts, asked, strict=True)
-        ]
-
-
-@dataclass(frozen=True)
-class _Draft:
-    """What coordinates are made of, at `SCALE_ANGLES` position angles, shape (angles,)."""
-
-    scale: Array
-    low: Array
-    """Of asinh(delta / w)."""
-    high: Array
-
-    @classmethod
-    def of(cls, u: Array, distances: Array, edge: Array, needs: Needs) -> _Draft:
-        """Return what is found from u at distances from the edge, shape (angles, distances)."""
-        scale = _scale(u, edge, needs)
-        stretched = np.arcsinh(distances / scale[:, None])
-        band = _band(u, stretched, needs)
-        if band is None:
-            return cls(scale, stretched[:, 0], stretched[:, -1])
-        return cls(scale, band[0] - BAND_MARGIN, band[1] + BAND_MARGIN)
-
-    def coordinates(self, edge: Array) -> _Coordinates:
-        """Return coordinates at more position angles, where the edge is given."""
-        columns = math.ceil((self.high - self.low).max() / STEP) + 1
-        low, high, scale = (_waves(each, len(edge)) for each in (self.low, self.high, np.log(self.scale)))
-        return _Coordinates(edge, np.exp(scale), low, (high - low) / (columns - 1), columns)
-
-
-def _band(u: Array, stretched: Array, needs: Needs) -> tuple[Array, Array] | None:
-    """Return where the disk's inner and outer rim are in asinh(delta / w), shape (angles,), from u at such places,
-    shape (angles, distances); None where the image does not end."""
-    # A ray that is not known deep inside the shadow is of no disk.
-    u = np.where(np.isnan(u) & (stretched < 0.0), np.inf, u)
-    found = []
-    for level in (1.0 / needs.inner, 1.0 / needs.outer):
-        with np.errstate(invalid="ignore"):
-            above = u >= level
-        last = above.sum(axis=1) - 1
-        once = (above == (np.arange(u.shape[1]) <= last[:, None])).all()
-        if not once or last.min() < 0 or last.max() > u.shape[1] - 2:
-            return None
-        here, there, high, low = (
-            np.take_along_axis(each, (last + i)[:, None], axis=1)[:, 0] for each in (stretched, u) for i in (0, 1)
-        )
-        found.append(here + (there - here) * (high - level) / (high - low))
-    if not np.isfinite(found).all():
-        return None
-    return found[0], found[1]
-
-
-def _scale(u: Array, edge: Array, needs: Needs) -> Array:
-    """Return w for a few position angles from u at distances from the edge, the farthest first and last."""
-    half = len(SHARES)
-    inside, outside = u[:, :half][:, ::-1], u[:, half:]  # from the edge away
-    change = np.fmax(np.abs(inside - inside[:, :1]), np.abs(outside - outside[:, :1]))
-    changed = np.fmax.accumulate(change, axis=1) > SCALE_CHANGE / needs.inner
-    changed[:, -1] = True  # where nothing crowds, the largest will do
-    scale: Array = SHARES[::-1][changed.argmax(axis=1)] * edge
-    return scale
-
-
-def _waves(values: Array, angles: int) -> Array:
-    """Return a coordinate's parameter at more position angles, by few waves: smooth, as it has to be."""
-    waves = np.fft.rfft(values)
-    waves[MOST_WAVES:] = 0.0
-    smooth: Array = np.fft.irfft(waves, angles) * (angles / len(values))
-    return smooth
-
-
 def _continue_inwards(values: Array, inside: Mask) -> None:
     """Replace values of shape (angles, columns) beyond the inner rim, where rays end at the horizon and are not smooth
     for long, by cubics through those next to it on the disk."""
@@ -417,19 +226,17 @@ def _continue_inwards(values: Array, inside: Mask) -> None:
         )
 
 
-def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array], Mask, Mask]:
+def _served(
+    values: tuple[Array, Array, Array], once_round: float, grid: Grid, needs: Needs
+) -> tuple[list[Array], Mask, Mask]:
     """Return the channels for `RingTable`, NaN where nothing is known well enough, where all of them are, and where u
-    is."""
+    is; for `once_round` see `_continuous`."""
     u, azimuth, slope = values
     angles = len(u)
     azimuth = np.nan_to_num(azimuth)  # rays that never cross: their u is not known either
-    azimuth[0] = np.unwrap(azimuth[0])
-    azimuth = np.unwrap(azimuth, axis=0)
-    # Once round the hole the image may have turned as well.
-    turn = 2.0 * math.pi * np.round((azimuth[-1] + (azimuth[-1] - azimuth[-2]) - azimuth[0]) / (2.0 * math.pi))
     around = np.arange(-2, angles + 3)
     u, slope = u[around % angles], slope[around % angles]
-    azimuth = azimuth[around % angles] + (around // angles)[:, None] * turn
+    azimuth = azimuth[around % angles] + (around // angles)[:, None] * once_round
     for each in (azimuth, slope):
         _continue_inwards(each, u >= 1.0 / needs.inner)
     off = np.maximum(1.0 / needs.outer - u, u - 1.0 / needs.inner)
@@ -459,7 +266,7 @@ def _served(values: Array, grid: _Coordinates, needs: Needs) -> tuple[list[Array
             placed = good
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
-    # Next to rays that never cross, neighbours may have been unwrapped by different turns.
+    # Next to rays that never cross.
     for axis in (0, 1):
         torn = np.abs(np.diff(azimuth, axis=axis)) > math.pi
         edge = [(0, 1) if i == axis else (0, 0) for i in (0, 1)]

@@ -22,6 +22,7 @@ from physics import (
     write_warp_map,
 )
 from physics.annulus import share_above
+from physics.disk_samples import PIXEL_ERROR
 from physics.radial_path import winding
 from physics.view import View
 
@@ -105,10 +106,17 @@ def test_passes_are_those_of_rays_traced_everywhere(parameters):
     columns, rows = some_pixels(parameters)
     counted = counted_coverage(parameters, columns, rows)
     inner, outer = parameters.disk.radii(parameters.spin)
-    centre, light = View(parameters).crossings(
-        columns + 0.5, rows + 0.5, parameters.disk.crossings, 1e-9, "gauss-legendre"
+    count = parameters.disk.crossings
+    (centre, light), *beside = (
+        View(parameters).crossings(columns + 0.5 + right, rows + 0.5 + down, count, 1e-9, "gauss-legendre")
+        for right, down in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
-    g = light.g(parameters.spin, centre.u, centre.u_slope, parameters.disk.retrograde)
+    g, *g_beside = (
+        each.g(parameters.spin, there.u, there.u_slope, parameters.disk.retrograde)
+        for there, each in ((centre, light), *beside)
+    )
+    change_of_g = np.hypot(*(there / g - 1.0 for there in g_beside))
+    change_of_radius = np.hypot(*(there.u / centre.u - 1.0 for there, _ in beside))
     assert (passes[0].coverage > 0.0).any()
     for order, one in enumerate(passes):
         share = one.coverage[rows, columns]
@@ -118,11 +126,11 @@ def test_passes_are_those_of_rays_traced_everywhere(parameters):
         assert np.quantile(error[:1500], 0.99) < 0.15
         assert error.max() < 0.6
         # Next to the edge they miss some thin images and count too much of others, but not on average.
-        beside = (share - counted[order])[1500:]
-        if len(beside):
+        at_edge = (share - counted[order])[1500:]
+        if len(at_edge):
             large = parameters in LARGE_SHOTS.values()
-            assert np.abs(beside).mean() < (0.008 if large else 0.04)
-            assert abs(beside.mean()) < (0.004 if large else 0.03)
+            assert np.abs(at_edge).mean() < (0.008 if large else 0.04)
+            assert abs(at_edge.mean()) < (0.004 if large else 0.03)
         seen = one.coverage > 0.0
         assert ((one.radius[seen] >= inner * (1 - 1e-6)) & (one.radius[seen] <= outer * (1 + 1e-6))).all()
         assert (one.g[seen] > 0.0).all()
@@ -134,10 +142,11 @@ def test_passes_are_those_of_rays_traced_everywhere(parameters):
             phi = centre.unwound[order][whole] + winding(parameters.spin, centre.u[order][whole])
             turn = np.abs((one.phi[rows, columns][whole] - phi + math.pi) % (2 * math.pi) - math.pi)
             shift = np.abs(one.g[rows, columns] / g[order] - 1.0)[whole]
-            # 2e-4 is promised where the image is not crowded.
-            assert np.median(radius) < 2e-4
-            assert np.median(turn) < 2e-4
-            assert np.median(shift) < 2e-4
+            # 2e-4 is promised, and where the image is crowded a share of what neighbouring pixels differ by.
+            crowd = PIXEL_ERROR * change_of_radius[order][whole]
+            assert np.median(radius / np.fmax(2e-4, crowd)) < 1.0
+            assert np.median(turn / np.fmax(2e-4, crowd)) < 1.0
+            assert np.median(shift / np.fmax(2e-4, PIXEL_ERROR * change_of_g[order][whole])) < 1.0
             assert np.quantile(radius, 0.95) < 0.01
 
 

@@ -8,8 +8,11 @@ import pytest
 from references import random_sky, reference_cameras
 
 from physics import BlackHoleError, Cancelled, Fate, Observer, trace_disk, trace_rays
+from physics.crossings import cross_plane
 from physics.metric import horizon_radius, isco_radius
 from physics.orbiting_matter import circular_constants, orbital_frequency, redshift_factor
+from physics.rays import rays_from_triad
+from physics.trapped import around_hole
 
 REFERENCES = {camera.name: camera for camera in reference_cameras("reference_disk.npz")}
 
@@ -83,6 +86,24 @@ def test_fates_are_those_of_the_sky(spin):
     theta_rd, phi_rd = random_sky(500)
     crossed = trace_disk(spin, observer, theta_rd, phi_rd)
     assert np.array_equal(crossed.fate, trace_rays(spin, observer, theta_rd, phi_rd).fate)
+
+
+@pytest.mark.parametrize("spin", [-0.99, 0.0, 0.9])
+def test_turns_are_counted_without_jumps_but_where_light_passes_over_the_axis(spin):
+    """Light to one side of the axis goes round it one way, to the other side the other way: half a turn each time it
+    passes the axis, which a camera above the plane sees before every crossing above the hole, once less below it."""
+    fido = Observer.fido(20.0, 1.2, 0.7)
+    around = np.linspace(0.0, 2.0 * math.pi, 20001)[:-1] + 1e-5
+    away = np.full_like(around, 0.3)  # just beside the shadow, where light turns three times
+    rays = rays_from_triad(spin, fido, around_hole(away, np.cos(around), np.sin(around)))
+    azimuth = cross_plane(rays, 3, 1e-9, beyond=True).unwound
+    below, above = len(around) - 1, len(around) // 2 - 1
+    for order, unwound in enumerate(azimuth):
+        step = np.diff(unwound, append=unwound[0])
+        for place, passes in ((below, order), (above, order + 1)):
+            assert abs(step[place]) == pytest.approx(2.0 * math.pi * passes, abs=0.05)
+            step[place] = 0.0
+        assert np.abs(step).max() < 0.1
 
 
 def test_orders_follow_one_another():

@@ -15,7 +15,8 @@ from physics.mino import radial_polynomial
 from physics.polar import PolarMotion
 from physics.radial_path import winding
 from physics.rays import rays_from_triad
-from physics.ring_table import Needs, ring_tables
+from physics.ring_grid import Needs
+from physics.ring_tracing import ring_tables
 from physics.sky_table import position_angles
 from physics.sphere import unit_vectors
 from physics.view import View
@@ -74,7 +75,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
         seen = known & on_disk
         assert (np.abs(u - exact) <= allowed)[seen].mean() > 0.999
         assert np.abs(u - exact)[seen].max() < 8e-3
-        turn = np.abs((azimuth - traced.unwound[order] + math.pi) % (2.0 * math.pi) - math.pi)
+        turn = np.abs(azimuth - traced.unwound[order])  # whole turns are counted alike
         assert turn[seen].max() < 0.03
         assert np.median(turn[seen]) < 2e-4
         # No place off the disk is shown on it, but within the error of a rim.
@@ -185,7 +186,7 @@ def test_rays_go_on_through_infinity_and_the_horizon(spin):
 
 
 def test_the_azimuth_is_not_torn_beside_rays_that_never_cross():
-    """There columns of the grid may be unwrapped by different turns, and answers between them would be wrong by pi."""
+    """There turns are counted from nothing, and answers between the grid's columns would be wrong by pi."""
     parameters = dataclasses.replace(
         shot(960, 540, spin=-0.998, radius=5.111, inclination=89.44, fov=149.0, motion="fido"),
         disk=Disk(outer_radius=100.0, retrograde=True),
@@ -198,4 +199,6 @@ def test_the_azimuth_is_not_torn_beside_rays_that_never_cross():
         u, azimuth = table.places(*position_angles(view.light(x, y)), 2)
         seen = np.isfinite(u) & (traced.u[order] > 1.0 / outer) & (traced.u[order] < 1.0 / inner)
         turn = np.abs((azimuth - traced.unwound[order] + math.pi) % (2.0 * math.pi) - math.pi)
-        assert (turn[seen] < 0.1).mean() > 0.999
+        assert turn[seen].max() < 0.5
+        # Where the camera is next to the plane all changes within two position angles of it, far below the pixel.
+        assert np.count_nonzero(turn[seen] > 0.1) <= 1 + 0.001 * np.count_nonzero(seen)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Making the tables of a disk's later images: rays around the shadow's edge of a FIDO's sky."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .crossings import cross_plane
+from .observer import Observer
+from .rays import Array, rays_from_triad
+from .ring_grid import SCALE_ANGLES, SHARES, Draft, Needs, between
+from .ring_table import RingTable
+from .sphere import cos_sin
+from .trapped import around_hole, edge_angles
+
+Index = NDArray[np.intp]
+
+# How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
+REACH = (0.7, 1.5)
+
+# Position angles of the grid, and of the finer one that is used where the first does not answer for this share of the
+# disk.
+ANGLES, MOST_ANGLES = 128, 256
+ENOUGH = 0.97
+
+# Error of the edge, in pixels, as long as the last image is the third; each that follows is thinner by up to e^pi.
+EDGE_ERROR = 1e-3
+THIRD = 2
+# How far from where it is known to be about it is looked for first, in pixels.
+EDGE_REACH = 0.25
+
+
+def ring_tables(
+    spin: float, observer: Observer, orders: Sequence[int], needs: Needs, edge_about: Array
+) -> dict[int, RingTable]:
+    """Return tables of some crossings, counted from 0, by their order; for `edge_about` see `View`.
+
+    The observer's motion does not matter: the tables are of its FIDO's sky. It must be outside the ergosphere, where
+    all rays have positive energy.
+    """
+    fido = Observer.fido(observer.r, observer.theta, observer.phi)
+    sky = _Sky(spin, fido, max(orders) + 1, needs, edge_about)
+    few = sky.evenly(SCALE_ANGLES)
+    edge = sky.edge[few]
+    distances = np.concatenate([-REACH[0] * SHARES, REACH[1] * SHARES[::-1]]) * edge[:, None]
+    (scouted,) = sky.cross([(edge[:, None] + distances, few, list(orders))])
+    drafts = {order: Draft.of(u, distances, edge, needs) for order, u in zip(orders, scouted[0], strict=True)}
+    index = sky.evenly(ANGLES)
+    grids = {order: draft.grid(sky.edge[index]) for order, draft in drafts.items()}
+    found = sky.cross([(grid.away, index, [order]) for order, grid in grids.items()])
+    traced = {order: new[:, 0] for order, new in zip(orders, found, strict=True)}
+    tables = {order: RingTable(grid, traced[order], needs) for order, grid in grids.items()}
+    left = {order: table.left() for order, table in tables.items() if table.answered < ENOUGH}
+    if not left:
+        return tables
+    fine = {order: drafts[order].grid(sky.edge, places.shape[1]) for order, places in left.items()}
+    asked = [(fine[order].away[places][:, None], np.nonzero(places)[0], [order]) for order, places in left.items()]
+    for (order, places), new in zip(left.items(), sky.cross(asked), strict=True):
+        values = between(traced[order])
+        values[:, places] = new[:, 0, :, 0]
+        tables[order] = RingTable(fine[order], values, needs)
+    return tables
+
+
+class _Sky:
+    """A FIDO's sky around the shadow: where its edge is, and where rays along it cross the plane."""
+
+    def __init__(self, spin: float, fido: Observer, count: int, needs: Needs, edge_about: Array) -> None:
+        """`count`: how many crossings of a ray are of interest."""
+        self._spin, self._fido, self._needs, self._count = spin, fido, needs, count
+        self._aside, self._up = cos_sin(
+            np.linspace(0.0, 2.0 * math.pi, MOST_ANGLES, endpoint=False, dtype=np.float64)
+        )
+        error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
+        place = np.arange(MOST_ANGLES) * (len(edge_about) / MOST_ANGLES)
+        near = np.interp(place, np.arange(len(edge_about)), edge_about, period=len(edge_about))
+        self.edge = edge_angles(spin, fido, self._aside, self._up, error, (near, EDGE_REACH * needs.pixel))
+        """How far the edge is from the hole's direction at the most position angles there are."""
+
+    def evenly(self, angles: int) -> Index:
+        """Return the numbers of so many of these position angles at equal steps."""
+        return np.arange(0, MOST_ANGLES, MOST_ANGLES // angles)
+
+    def cross(self, asked: list[tuple[Array, Index, list[int]]]) -> list[Array]:
+        """Return u, unwound azimuth and du / dlambda, shape (3, orders, rows, distances), for each that is asked for.
+
+        Asked for are angles from the hole's direction, shape (rows, distances); the numbers of the rows' position
+        angles; and the orders of the crossings.
+        """
+        looking, wanted = [], []
+        for away, index, orders in asked:
+            looking.append(around_hole(away, self._aside[index, None], self._up[index, None]).reshape(-1, 3))
+            here = np.zeros((self._count, away.size), dtype=bool)
+            here[orders] = True
+            wanted.append(here)
+        light, every = rays_from_triad(self._spin, self._fido, np.concatenate(looking)), np.concatenate(wanted, axis=1)
+        crossings = cross_plane(light, self._count, self._needs.tolerance, beyond=True, wanted=every)
+        values = np.stack([crossings.u, crossings.unwound, crossings.u_slope])
+        ends = np.cumsum([away.size for away, *_ in asked])
+        parts = np.split(values, ends[:-1], axis=2)
+        return [
+            part[:, orders].reshape(3, len(orders), *away.shape)
+            for part, (away, _, orders) in zip(parts, asked, strict=True)
+        ]
