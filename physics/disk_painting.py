@@ -85,6 +85,7 @@ class DiskPainting:
             yield from self._adaptive()
         else:
             tiles = tiles_of(self._width, self._height, TILE_SIDES[-1])
+            self._tracing.asked[:] = True
             yield from self._tracing.steps(tiles, np.ones((len(tiles), self._crossings), dtype=bool), 0.0)
 
     # --- tiles ---------------------------------------------------------------------------------------
@@ -146,9 +147,9 @@ class DiskPainting:
 
     def _marked(self, tiles: Tiles, x: Array, y: Array) -> Mask:
         """Return which tiles hold a marked place, shape (n,)."""
-        columns = self._width // tiles.side + 2
-        places = np.unique((y // tiles.side).astype(np.intp) * columns + (x // tiles.side).astype(np.intp))
-        marked: Mask = np.isin(tiles.row // tiles.side * columns + tiles.column // tiles.side, places)
+        held = np.zeros((self._height // tiles.side + 2, self._width // tiles.side + 2), dtype=bool)
+        held[(y // tiles.side).astype(np.intp), (x // tiles.side).astype(np.intp)] = True
+        marked: Mask = held[tiles.row // tiles.side, tiles.column // tiles.side]
         return marked
 
     def _settle(self, tiles: Tiles, marked: Mask, wanted: Mask, part: NDArray[np.intp]) -> None:
@@ -158,6 +159,10 @@ class DiskPainting:
         values, lost = self._samples.at(x, y, places, smooth=False)
         values = values.reshape(*values.shape[:2], len(tiles), DISK_POINTS, DISK_POINTS)
         broken = lost.reshape(len(tiles), -1).any(axis=1)
+        if tiles.side == TILE_SIDES[-1] and broken.any():
+            whole = tiles.select(broken)
+            for asked in self._tracing.asked:
+                whole.put(asked, np.ones((len(whole), whole.side, whole.side), dtype=bool))
         for order, sampled in enumerate(values):
             chosen = np.flatnonzero(wanted[part, order] & ~broken)
             if not len(chosen):
@@ -184,11 +189,11 @@ class DiskPainting:
         direct, simple = self._matter_coefficients(bent[filled], sampled[:, filled], tiles.side)
         self._planes.fill(order, tiles.select(filled[simple]), direct, self._bent.matter)
         self._planes.fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
-        if tiles.side == TILE_SIDES[-1]:
+        if tiles.side == TILE_SIDES[-1] and order not in self._samples.rings:
             left = np.flatnonzero(~(good | empty))
             near = near_annulus(u[left], 1.0 / self._outer, 1.0 / self._inner)
             near[marked[left]] = True
-            tiles.select(left).put(self._tracing.far[order], ~near)
+            tiles.select(left).put(self._tracing.asked[order], near)
         settled: Mask = good | empty
         return settled
 

@@ -46,22 +46,23 @@ class DiskTracing:
         self._bounds = min(LOWEST_STEP / outer, FARTHEST_STEP), HIGHEST_STEP / inner
         self._crossings = len(planes.planes)
         self._width, self._height = size
-        self.far = np.zeros((self._crossings, self._height, self._width), dtype=bool)
-        """Pixels that are known to be off the disk, or need not be traced, by crossing."""
-        self._kept: dict[int, Mask] = {}
+        self.asked = np.zeros((self._crossings, self._height, self._width), dtype=bool)
+        """Pixels that are to be traced, by crossing: of the others it is known that they are off the disk."""
+        self._filled: dict[int, Mask] = {}
         self.unresolved = np.zeros((self._height, self._width), dtype=bool)
         """Pixels whose ray was given up."""
 
     def trace_only(self, order: int, columns: Index, rows: Index) -> Tiles:
-        """Leave none but the chosen pixels of a crossing, shape (n,), to be filled; neighbours are traced along. Return
-        the smallest tiles that hold any of these."""
+        """Ask for the chosen pixels of a crossing, shape (n,), and none else; neighbours are traced along. Return the
+        smallest tiles that hold any of these."""
+        if not len(columns):
+            return Tiles(TILE_SIDES[-1], columns, rows)
         beside = np.arange(-BESIDE, BESIDE + 1)
         column = np.clip(columns[:, None, None] + beside, 0, self._width - 1)
         row = np.clip(rows[:, None, None] + beside[:, None], 0, self._height - 1)
-        self.far[order] = True
-        self.far[order, row, column] = False
-        self._kept[order] = np.ones((self._height, self._width), dtype=bool)
-        self._kept[order][rows, columns] = False
+        self.asked[order, row, column] = True
+        self._filled[order] = np.zeros((self._height, self._width), dtype=bool)
+        self._filled[order][rows, columns] = True
         side = TILE_SIDES[-1]
         held = np.zeros((-(-self._height // side), -(-self._width // side)), dtype=bool)
         held[row // side, column // side] = True
@@ -82,7 +83,7 @@ class DiskTracing:
         columns, rows = np.broadcast_to(columns, shape), np.broadcast_to(rows, shape)
         inside = (columns < self._width) & (rows < self._height)
         looked = (np.minimum(rows, self._height - 1), np.minimum(columns, self._width - 1))
-        every = wanted.T[:, :, None, None] & ~self.far[:, *looked]
+        every = wanted.T[:, :, None, None] & self.asked[:, *looked]
         traced: Mask = every.any(axis=0)
         values = np.full((self._crossings, self._samples.channels, *shape), np.nan)
         x, y = columns[traced].astype(np.float64) + 0.5, rows[traced].astype(np.float64) + 0.5
@@ -100,8 +101,8 @@ class DiskTracing:
             down, across = np.gradient(here[U], axis=1), np.gradient(here[U], axis=2)
             finer = self._needs_finer(here[U], across, down)
             open_here = inside[chosen]
-            if order in self._kept:
-                open_here &= ~self._kept[order][looked][chosen]
+            if order in self._filled:
+                open_here &= self._filled[order][looked][chosen]
             finer &= open_here
             with np.errstate(invalid="ignore"):
                 share = coverage(here[U], across, down, self._low, self._high)
