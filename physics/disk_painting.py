@@ -243,8 +243,7 @@ class DiskPainting:
 
     def _write_ring(self, order: int, pixels: RingPixels) -> Mask:
         """Write those pixels that an image's table knows; return which these are."""
-        x, y = pixels.column.astype(np.float64) + 0.5, pixels.row.astype(np.float64) + 0.5
-        radius, phi, g = self._samples.at_ring(order, x, y, pixels.away, pixels.angle)
+        radius, phi, g = self._samples.at_ring(order, (pixels.energy, pixels.momentum), pixels.away, pixels.angle)
         known: Mask = np.isfinite(radius).all(axis=0)
         radius, phi, g = radius[:, known], phi[:, known], g[:, known]
         one = (radius[0], phi[0], g[0]) if len(radius) == 1 else mean_matter(radius, phi, g, WEIGHTS[:, None])

@@ -148,8 +148,8 @@ class DiskSamples:
         needs = Needs(
             self._inner, self._outer, self._tolerance, pixel, PIXEL_ERROR, PLACE_ERROR * self._parameters.interpolation
         )
-        self._tables = ring_tables(self._parameters.spin, observer, orders, needs, self._view.edge_about)
-        self.rays += sum(table.rays for table in self._tables.values())
+        self._tables, rays = ring_tables(self._parameters.spin, observer, orders, needs, self._view.edge_about)
+        self.rays += rays
 
     def _sees_shadow(self, r: float) -> bool:
         """Return whether the surroundings of the shadow may be in the picture."""
@@ -164,15 +164,15 @@ class DiskSamples:
         """The tables of those images that are bands around the shadow, by order, counted from 0."""
         return {order: table for order, table in self._tables.items() if table.confined}
 
-    def at_ring(self, order: int, x: Array, y: Array, away: Array, angle: Array) -> Matter:
-        """Return the matter at `position_angles` that pixel coordinates x, y, shape (n,), are near to, from the
-        table of an image; NaN where it has no answer.
+    def at_ring(self, order: int, light: tuple[Array, Array], away: Array, angle: Array) -> Matter:
+        """Return the matter at `position_angles` from the table of an image, for light of this energy and angular
+        momentum; NaN where it has no answer.
 
-        There may be several angles from the hole's direction for each: `away`, and what is returned, is of shape
-        (k, n).
+        There may be several angles from the hole's direction for each position angle, shape (n,): `away`, and what is
+        returned, is of shape (k, n).
         """
-        every = [np.broadcast_to(each, away.shape).ravel() for each in (*self._view.light_and_momenta(x, y)[1:], angle)]
-        u, *others = self._from_table(order, (every[0], every[1]), away.ravel(), every[2])
+        energy, momentum, angle = (np.broadcast_to(each, away.shape).ravel() for each in (*light, angle))
+        u, *others = self._from_table(order, (energy, momentum), away.ravel(), angle)
         u = np.clip(u, 1.0 / self._outer, 1.0 / self._inner)
         return self.matter(np.stack([u, *others]).reshape(self.channels, *away.shape))
 

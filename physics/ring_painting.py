@@ -60,14 +60,16 @@ class RingPixels(NamedTuple):
     covered, else those of `PLACES`."""
     angle: Array
     """Position angle."""
+    energy: Array
+    momentum: Array
+    """Of the light, for a camera energy of 1."""
 
     def blocks(self) -> Iterator[RingPixels]:
         """Yield some of them at a time."""
         for start in range(0, len(self.column), BLOCK):
             part = slice(start, start + BLOCK)
-            yield RingPixels(
-                self.column[part], self.row[part], self.share[part], self.away[:, part], self.angle[part]
-            )
+            place = self.column[part], self.row[part], self.share[part]
+            yield RingPixels(*place, self.away[:, part], self.angle[part], self.energy[part], self.momentum[part])
 
 
 class TileSurvey:
@@ -139,7 +141,8 @@ class RingPainting:
         wide = tiles.side + 2  # a pixel more on each side, for slopes
         steps = np.arange(-1, tiles.side + 1) + 0.5
         x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
-        away, angle = position_angles(self._view.light(x.ravel(), y.ravel()))
+        light, *momenta = self._view.light_and_momenta(x.ravel(), y.ravel())
+        away, angle = position_angles(light)
         place = tiles.row // tiles.side, tiles.column // tiles.side
         nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
         own = away.reshape(x.shape)[OWN]
@@ -151,7 +154,7 @@ class RingPainting:
         (inner, inner_slope, outer, outer_slope), known = self._table.band(angle.take(here))
         gone = [0.5 * (away.take(here + step) - away.take(here - step)) for step in (1, wide)]
         turned = [0.5 * nearest_turn(angle.take(here + step) - angle.take(here - step)) for step in (1, wide)]
-        away, angle = away.take(here), angle.take(here)
+        away, angle, energy, momentum = (each.take(here) for each in (away, angle, *momenta))
         # How the distance from each rim changes from pixel to pixel.
         inner_steps, outer_steps = (
             [slope * turn - step for turn, step in zip(turned, gone, strict=True)]
@@ -165,9 +168,10 @@ class RingPainting:
         middle, inner, outer = (each.take(partly) for each in (away, inner, outer))
         low, high = (np.clip(middle + each, inner, outer) for each in (-half, half))
         places = low + PLACES[:, None] * (high - low)
-        return (
-            RingPixels(columns[whole], rows[whole], np.ones(len(whole)), away[None, whole], angle[whole]),
-            RingPixels(columns[partly], rows[partly], share[partly], places, angle[partly]),
-            columns[~known],
-            rows[~known],
-        )
+        share[whole] = 1.0
+
+        def seen(pixels: Index, away: Array) -> RingPixels:
+            place = columns[pixels], rows[pixels], share[pixels]
+            return RingPixels(*place, away, *(each.take(pixels) for each in (angle, energy, momentum)))
+
+        return seen(whole, away[None, whole]), seen(partly, places), columns[~known], rows[~known]

@@ -77,11 +77,6 @@ class RingTable:
         self.confined = bool(within and np.isfinite(self._band).all() and known.mean() > ENOUGH_ROWS)
         """Whether all of the image is in the table: it is a band around the shadow."""
 
-    @property
-    def rays(self) -> int:
-        """How many rays it was made of, but for those that told the scale."""
-        return self._angles * (self._columns + 2)
-
     def left(self) -> Mask:
         """Return which places of a grid twice as fine, shape (2 angles, 2 columns - 1), have to be known for all of the
         disk to be, and are not yet."""
@@ -226,6 +221,14 @@ def _continue_inwards(values: Array, inside: Mask) -> None:
         )
 
 
+def _left_out(values: Array, axis: int) -> Array:
+    """Return what cubics through neighbours along an axis leave out at the most, from the nearest fourth difference."""
+    differences = np.abs(np.diff(values, 4, axis=axis))
+    nearest = np.clip(np.arange(values.shape[axis]) - 2, 0, differences.shape[axis] - 1)
+    left_out: Array = AROUND_ERROR * differences.take(nearest, axis=axis)
+    return left_out
+
+
 def _served(
     values: tuple[Array, Array, Array], once_round: float, grid: Grid, needs: Needs
 ) -> tuple[list[Array], Mask, Mask]:
@@ -254,11 +257,7 @@ def _served(
     stray += (lost_low + lost_step * np.arange(grid.columns)) / grid.step[wide, None]
     good = np.ones(u.shape, dtype=bool)
     for each, small in ((u, needs.place_error / needs.outer), (azimuth, needs.place_error)):
-        error = np.zeros_like(each)
-        for axis in (0, 1):
-            left_out = AROUND_ERROR * np.abs(np.diff(each, 4, axis=axis))
-            padded = np.pad(left_out, [(2, 2) if i == axis else (0, 0) for i in (0, 1)], mode="edge")
-            error = np.maximum(error, padded)
+        error = np.maximum(*(_left_out(each, axis) for axis in (0, 1)))
         change = np.gradient(each, axis=1), np.gradient(each, axis=0)
         error += stray * np.abs(change[0])
         good = good & (error < np.maximum(needs.pixel_error * np.hypot(change[0] * along, change[1] * across), small))
@@ -266,11 +265,11 @@ def _served(
             placed = good
             # Off the disk, and so are all places around.
             far = off > OFF_MARGIN * error + 2.0 * (np.abs(change[0]) + np.abs(change[1]))
-    # Next to rays that never cross.
-    for axis in (0, 1):
-        torn = np.abs(np.diff(azimuth, axis=axis)) > math.pi
-        edge = [(0, 1) if i == axis else (0, 0) for i in (0, 1)]
-        good &= ~np.pad(torn, edge) & ~np.pad(torn, [each[::-1] for each in edge])
+    # Next to rays that never cross there is nothing to count turns from.
+    for view, torn in ((good, np.diff(azimuth, axis=0)), (good.T, np.diff(azimuth, axis=1).T)):
+        whole = np.abs(torn) <= math.pi
+        view[1:] &= whole
+        view[:-1] &= whole
     known = good | far
     channels = [np.where(known, each, np.nan)[1:-1, 1:-1] for each in (u, azimuth, slope)]
     return channels, good[1:-1, 1:-1], placed[1:-1, 1:-1]

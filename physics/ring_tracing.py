@@ -31,13 +31,14 @@ ENOUGH = 0.97
 EDGE_ERROR = 1e-3
 THIRD = 2
 # How far from where it is known to be about it is looked for first, in pixels.
-EDGE_REACH = 0.25
+EDGE_REACH = 0.05
 
 
 def ring_tables(
     spin: float, observer: Observer, orders: Sequence[int], needs: Needs, edge_about: Array
-) -> dict[int, RingTable]:
-    """Return tables of some crossings, counted from 0, by their order; for `edge_about` see `View`.
+) -> tuple[dict[int, RingTable], int]:
+    """Return tables of some crossings, counted from 0, by their order, and how many rays these took; for `edge_about`
+    see `View`.
 
     The observer's motion does not matter: the tables are of its FIDO's sky. It must be outside the ergosphere, where
     all rays have positive energy.
@@ -56,14 +57,14 @@ def ring_tables(
     tables = {order: RingTable(grid, traced[order], needs) for order, grid in grids.items()}
     left = {order: table.left() for order, table in tables.items() if table.answered < ENOUGH}
     if not left:
-        return tables
+        return tables, sky.rays
     fine = {order: drafts[order].grid(sky.edge, places.shape[1]) for order, places in left.items()}
     asked = [(fine[order].away[places][:, None], np.nonzero(places)[0], [order]) for order, places in left.items()]
     for (order, places), new in zip(left.items(), sky.cross(asked), strict=True):
         values = between(traced[order])
         values[:, places] = new[:, 0, :, 0]
         tables[order] = RingTable(fine[order], values, needs)
-    return tables
+    return tables, sky.rays
 
 
 class _Sky:
@@ -80,6 +81,8 @@ class _Sky:
         near = np.interp(place, np.arange(len(edge_about)), edge_about, period=len(edge_about))
         self.edge = edge_angles(spin, fido, self._aside, self._up, error, (near, EDGE_REACH * needs.pixel))
         """How far the edge is from the hole's direction at the most position angles there are."""
+        self.rays = 0
+        """How many rays were traced so far."""
 
     def evenly(self, angles: int) -> Index:
         """Return the numbers of so many of these position angles at equal steps."""
@@ -97,6 +100,7 @@ class _Sky:
             here = np.zeros((self._count, away.size), dtype=bool)
             here[orders] = True
             wanted.append(here)
+        self.rays += sum(away.size for away, *_ in asked)
         light, every = rays_from_triad(self._spin, self._fido, np.concatenate(looking)), np.concatenate(wanted, axis=1)
         crossings = cross_plane(light, self._count, self._needs.tolerance, beyond=True, wanted=every)
         values = np.stack([crossings.u, crossings.unwound, crossings.u_slope])

@@ -142,21 +142,38 @@ def edge_angles(
 
     The shadow surrounds the hole's direction, and each great circle from there to the opposite point, which is sky,
     crosses its edge once. The answer lies on the sky's side, within `error` radians; for `aside` and `up` see
-    `around_hole`. `about`: where the edge is looked for first, if that is known, and how far on both sides.
+    `around_hole`. `about`: where the edge is looked for first, if that is known, and how far on both sides. So near
+    to it the edge function is nearly a straight line, which then says at once where the edge is to `error`.
     """
 
-    def is_sky(away: Array) -> NDArray[np.bool_]:
-        return edge_function(rays_from_triad(spin, fido, around_hole(away, aside, up))) > 0.0
+    def height(*away: Array) -> Array:
+        looking = [around_hole(each, aside, up) for each in away]
+        values = edge_function(rays_from_triad(spin, fido, np.concatenate(looking)))
+        return values.reshape(len(away), -1)
 
     low, high = np.zeros(len(aside)), np.full(len(aside), math.pi)
+
+    def narrow(before: Array, after: Array) -> Array:
+        """Take for low and high what lies in the shadow and in the sky of two places each; return their heights."""
+        heights = height(before, after)
+        for place, here in ((before, heights[0]), (after, heights[1])):
+            inside = (place > low) & (place < high)
+            sky = here > 0.0
+            np.copyto(low, place, where=inside & ~sky)
+            np.copyto(high, place, where=inside & sky)
+        return heights
+
     if about is not None:
         near, reach = about
-        first, last = np.maximum(near - reach, low), np.minimum(near + reach, high)
-        if not is_sky(first).any() and is_sky(last).all():
-            low, high = first, last
+        first, last = near - reach, near + reach
+        below, above = narrow(first, last)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            edge = first - 2.0 * reach * below / (above - below)
+        edge = np.where(np.abs(edge - near) < reach, edge, near)
+        narrow(edge - 0.4 * error, edge + 0.4 * error)
     for _ in range(math.ceil(math.log2((high - low).max() / error))):
         middle = 0.5 * (low + high)
-        sky = is_sky(middle)
+        sky = height(middle)[0] > 0.0
         low, high = np.where(sky, low, middle), np.where(sky, middle, high)
     return high
 

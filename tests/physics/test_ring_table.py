@@ -37,7 +37,7 @@ def tables_of(parameters):
     needs = Needs(
         inner, outer, 2e-5, parameters.pixel_angle, PIXEL_ERROR, PLACE_ERROR * parameters.interpolation
     )
-    return ring_tables(parameters.spin, parameters.observer(), (1, 2), needs, View(parameters).edge_about)
+    return ring_tables(parameters.spin, parameters.observer(), (1, 2), needs, View(parameters).edge_about)[0]
 
 
 def around_the_edge(view, count):

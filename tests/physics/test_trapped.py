@@ -12,6 +12,7 @@ from physics.metric import horizon_radius
 from physics.rays import camera_directions, rays_from_camera
 from physics.trapped import (
     comes_from_sky,
+    edge_angles,
     edge_function,
     trapped_carter_constant,
     trapped_impact_parameters,
@@ -143,3 +144,19 @@ def test_rays_of_negative_energy_are_shadow():
     assert 0 < np.count_nonzero(~rays.escapes) < len(rays)
     assert not comes_from_sky(rays)[~rays.escapes].any()
     assert np.isnan(rays.one_plus_z[~rays.escapes]).all()
+
+
+@pytest.mark.parametrize("error", [1e-4, 1e-7, 1e-12])
+@pytest.mark.parametrize(("off", "reach"), [(0.0, 1e-3), (9e-4, 1e-3), (-9e-4, 1e-3), (0.1, 1e-3), (-0.2, 0.5)])
+@pytest.mark.parametrize("radius", [3.5, 12.0, 1000.0])
+def test_the_edge_is_found_wherever_it_is_looked_for_first(radius, off, reach, error):
+    """Synge's closed form for a camera at rest outside a hole without spin, sin^2 = 27 (1 - 2 / r) / r^2, and on the
+    sky's side. Rounding of it costs 1e-15 times the radius."""
+    turn = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
+    expected = math.asin(math.sqrt(27.0 * (1.0 - 2.0 / radius)) / radius)
+    about = np.full(len(turn), expected + off)
+    found = edge_angles(
+        0.0, Observer.fido(radius, 1.1, 0.3), np.cos(turn), np.sin(turn), error, about=(about, reach)
+    )
+    assert np.all(found >= expected - 1e-14 * radius)
+    assert np.all(found <= expected + error + 1e-14 * radius)
