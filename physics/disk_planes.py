@@ -27,7 +27,7 @@ MatterOf = Callable[[Channels], Matter]
 BENT_FROM = 2.0
 
 # Tiles of which this share is wholly covered are written whole.
-DENSE = 0.3
+DENSE = 0.15
 
 # How much steeper than at the places looked at a tile may be between them.
 STEEPER = 1.2
@@ -131,7 +131,7 @@ class DiskPlanes:
         with np.errstate(all="ignore"):  # off the disk there is no matter
             found = matter(values)
         for plane, channel in zip(self.planes[order], (*found, wholly), strict=True):
-            tiles.put(plane, np.where(wholly, channel, np.float32(0.0)))
+            tiles.put(plane, channel, wholly)
 
     def _in_picture(self, tiles: Tiles, places: Index) -> tuple[Index, Index]:
         """Return those of some places, given by their numbers in (n, side, side), that are in the picture, and their

@@ -284,6 +284,9 @@ def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
 def in_circle(phi: NDArray[np.floating[Any]]) -> Image:
     """Return any angles brought to [0, 2 pi) in single precision."""
     turn = phi.dtype.type(2.0 * math.pi)
+    single = phi.astype(np.float32, copy=False)
+    if single.size and single.min() >= 0.0 and single.max() < np.float32(turn):
+        return single
     rest = np.floor(phi * (1.0 / turn))
     rest *= turn
     np.subtract(phi, rest, out=rest)

@@ -66,12 +66,17 @@ class Tiles:
         steps = np.arange(self.side)
         return self.column[:, None, None] + steps, self.row[:, None, None] + steps[:, None]
 
-    def put(self, image: NDArray[Any], values: NDArray[Any]) -> None:
-        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it."""
+    def put(self, image: NDArray[Any], values: NDArray[Any], where: NDArray[np.bool_] | None = None) -> None:
+        """Write values, shape (n, side, side, ...), to the tiles' places in an image, as far as they lie inside it; all
+        of them, or some."""
         for i in range(len(self)):
             top, left = self.row[i], self.column[i]
             place = image[top : top + self.side, left : left + self.side]
-            place[:] = values[i, : place.shape[0], : place.shape[1]]
+            part = (i, slice(place.shape[0]), slice(place.shape[1]))
+            if where is None:
+                place[:] = values[part]
+            else:
+                np.copyto(place, values[part], where=where[part])
 
     def within(self, width: int, height: int) -> Tiles:
         """Return the tiles that hold any pixel of the picture."""
