@@ -11,6 +11,7 @@ the band in it.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from .quadrature import gauss_legendre
 from .rays import Array
 from .ring_table import RingTable
 from .sky_table import nearest_turn, position_angles
-from .tiles import TILE_SIDES, Tiles, tiles_of
+from .tiles import TILE_SIDES, Tiles, chebyshev_places, tiles_of, to_coefficients
 from .view import View
 
 Mask = NDArray[np.bool_]
@@ -38,14 +39,20 @@ PLACES, WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
 LOOKS, LOOKS_IN_PANORAMA = 1, 4
 BULGE, BESIDE_HOLE = 0.25, 2.0
 
+# Points along each side of a tile that say where its pixels are, if the highest coefficients of a polynomial through
+# them are below this share of the tile's size.
+NODES, SMOOTH = 5, 3e-4
+
 # Tiles worked through at a time: their pixels stay in the cache.
 GROUP = 64
 
 # Pixels that a table is asked for at a time, for the same reason.
 BLOCK = 8192
 
-# What of a tile with a pixel more on each side is the tile.
-OWN = (slice(None), slice(1, -1), slice(1, -1))
+# What of tiles with a pixel more on each side is the tiles.
+OWN = (..., slice(1, -1), slice(1, -1))
+
+TURN = 2.0 * math.pi
 
 
 class RingPixels(NamedTuple):
@@ -105,7 +112,7 @@ class RingPainting:
     """Which pixels see the band that is in a table."""
 
     def __init__(self, survey: TileSurvey, table: RingTable) -> None:
-        self._view, self._table = survey.view, table
+        self._survey, self._table = survey, table
         self._width, self._height = survey.width, survey.height
         (inner, _, outer, _), _ = table.band(survey.angle)
         first, _ = survey.extremes(inner)
@@ -138,40 +145,91 @@ class RingPainting:
         return found, np.concatenate(columns), np.concatenate(rows)
 
     def _pixels(self, tiles: Tiles) -> tuple[RingPixels, RingPixels, Index, Index]:
-        wide = tiles.side + 2  # a pixel more on each side, for slopes
-        steps = np.arange(-1, tiles.side + 1) + 0.5
-        x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
-        light, *momenta = self._view.light_and_momenta(x.ravel(), y.ravel())
-        away, angle = position_angles(light)
-        place = tiles.row // tiles.side, tiles.column // tiles.side
-        nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
-        own = away.reshape(x.shape)[OWN]
-        near = np.zeros(x.shape, dtype=bool)
-        near[OWN] = (own > nearest) & (own < farthest) & (x[OWN] < self._width) & (y[OWN] < self._height)
-        here = np.flatnonzero(near)
-        tile, row, column = np.unravel_index(here, x.shape)
-        columns, rows = tiles.column[tile] + column - 1, tiles.row[tile] + row - 1
-        (inner, inner_slope, outer, outer_slope), known = self._table.band(angle.take(here))
-        gone = [0.5 * (away.take(here + step) - away.take(here - step)) for step in (1, wide)]
-        turned = [0.5 * nearest_turn(angle.take(here + step) - angle.take(here - step)) for step in (1, wide)]
-        away, angle, energy, momentum = (each.take(here) for each in (away, angle, *momenta))
-        # How the distance from each rim changes from pixel to pixel.
-        inner_steps, outer_steps = (
-            [slope * turn - step for turn, step in zip(turned, gone, strict=True)]
-            for slope in (inner_slope, outer_slope)
-        )
-        share = share_above(outer - away, *outer_steps) - share_above(inner - away, *inner_steps)
+        values, known = self._at_pixels(tiles)
+        steps = [_steps(each) for each in values[:2]]
+        from_inner, from_outer, away, angle, energy, momentum = values[OWN]
+        columns, rows = tiles.pixels()
+        inner_reach, outer_reach = (0.5 * (np.abs(right) + np.abs(down)) for right, down in steps)
+        near = (from_inner > -inner_reach) & (from_outer < outer_reach)
+        if not known.all():  # there the rims may be anywhere in the tile's part of the band
+            place = tiles.row // tiles.side, tiles.column // tiles.side
+            nearest, farthest = (each[place][:, None, None] for each in (self._nearest, self._farthest))
+            near = np.where(known, near, (away > nearest) & (away < farthest))
+        near &= (columns < self._width) & (rows < self._height)
+        here = np.nonzero(near)
+        columns, rows = tiles.column[here[0]] + here[2], tiles.row[here[0]] + here[1]
+        from_inner, from_outer, known = from_inner[here], from_outer[here], known[here]
+        inner_steps, outer_steps = ([each[here] for each in both] for both in steps)
+        share = share_above(from_inner, *inner_steps) - share_above(from_outer, *outer_steps)
         share[~known] = 0.0
-        whole = np.flatnonzero(share > 1.0 - LEAST_COVERAGE)
-        partly = np.flatnonzero((share > LEAST_COVERAGE) & (share <= 1.0 - LEAST_COVERAGE))
-        half = 0.5 * np.hypot(*(each.take(partly) for each in outer_steps))
-        middle, inner, outer = (each.take(partly) for each in (away, inner, outer))
-        low, high = (np.clip(middle + each, inner, outer) for each in (-half, half))
-        places = low + PLACES[:, None] * (high - low)
-        share[whole] = 1.0
+        share[share > 1.0 - LEAST_COVERAGE] = 1.0
+        whole = np.flatnonzero(share == 1.0)
+        partly = np.flatnonzero((share > LEAST_COVERAGE) & (share < 1.0))
+        half = 0.5 * np.hypot(*(each[partly] for each in outer_steps))
+        low, high = (np.clip(each, -from_inner[partly], -from_outer[partly]) for each in (-half, half))
 
-        def seen(pixels: Index, away: Array) -> RingPixels:
-            place = columns[pixels], rows[pixels], share[pixels]
-            return RingPixels(*place, away, *(each.take(pixels) for each in (angle, energy, momentum)))
+        def seen(pixels: Index, off: Array) -> RingPixels:
+            place = tuple(each[pixels] for each in here)
+            turned = angle[place] - TURN * np.floor(angle[place] / TURN)
+            light = turned, energy[place], momentum[place]
+            return RingPixels(columns[pixels], rows[pixels], share[pixels], away[place] + off, *light)
 
-        return seen(whole, away[None, whole]), seen(partly, places), columns[~known], rows[~known]
+        found = seen(whole, np.zeros((1, len(whole)))), seen(partly, low + PLACES[:, None] * (high - low))
+        return *found, columns[~known], rows[~known]
+
+    def _at_pixels(self, tiles: Tiles) -> tuple[Array, Mask]:
+        """Return what `_sampled` does at the pixels of tiles and at one more on each side, shape (6, n, side + 2,
+        side + 2), and at which of their own the rims are well known, shape (n, side, side).
+
+        Nearly everywhere a polynomial through a few places says that to a hundredth of a pixel, and sooner.
+        """
+        wide = tiles.side + 2
+        sampled, known = self._sampled(tiles, chebyshev_places(NODES) * (wide - 1) - 0.5)
+        sampled[3] = sampled[3, :, :1, :1] + nearest_turn(sampled[3] - sampled[3, :, :1, :1])
+        highest = to_coefficients(NODES)[-1]
+        tail = np.maximum(np.abs(sampled[:4] @ highest), np.abs(sampled[:4].swapaxes(2, 3) @ highest)).max(axis=2)
+        tail[3] *= sampled[2].max(axis=(1, 2))
+        size = self._survey.size[tiles.row // tiles.side, tiles.column // tiles.side]
+        smooth = known.all(axis=(1, 2)) & (tail < SMOOTH * size).all(axis=0)
+        values = _interpolated(sampled, wide)
+        well_known = np.ones((len(tiles), tiles.side, tiles.side), dtype=bool)
+        if not smooth.all():
+            values[:, ~smooth], known = self._sampled(tiles.select(~smooth), np.arange(wide, dtype=np.float64) - 0.5)
+            well_known[~smooth] = known[OWN]
+        return values, well_known
+
+    def _sampled(self, tiles: Tiles, steps: Array) -> tuple[Array, Mask]:
+        """Return at places so many pixels from the left and top of tiles, shape (6, n, k, k): how much farther from the
+        hole's direction they are than the disk's inner rim and than its outer rim, the angle from that direction and
+        the position angle, and the light's energy and angular momentum; and whether the rims are well known there."""
+        x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
+        light, *momenta = self._survey.view.light_and_momenta(x.ravel(), y.ravel())
+        away, angle = position_angles(light)
+        (inner, _, outer, _), known = self._table.band(angle)
+        values = np.stack([away - inner, away - outer, away, angle, *momenta]).reshape(6, *x.shape)
+        return values, known.reshape(x.shape)
+
+
+def _interpolated(values: Array, wide: int) -> Array:
+    """Return values at equal steps from end to end, shape (..., wide, wide), from those at `NODES` x `NODES` Chebyshev
+    points: in two matrix products, as many small ones take longer."""
+    to_pixels = _to_equal_steps(wide).T
+    for _ in (0, 1):
+        values = values.swapaxes(2, 3)
+        values = (values.reshape(-1, NODES) @ to_pixels).reshape(*values.shape[:3], wide)
+    return values
+
+
+@functools.cache
+def _to_equal_steps(count: int) -> Array:
+    """Return the matrix from values at `NODES` Chebyshev points to such at equal steps from end to end."""
+    place = np.linspace(-1.0, 1.0, count)
+    polynomials: Array = np.cos(np.arange(NODES) * np.arccos(place)[:, None])
+    return polynomials @ to_coefficients(NODES)
+
+
+def _steps(values: Array) -> tuple[Array, Array]:
+    """Return the changes from pixel to pixel, along the rows and down, of values with a pixel more on each side."""
+    right = 0.5 * (values[:, 1:-1, 2:] - values[:, 1:-1, :-2])
+    down = 0.5 * (values[:, 2:, 1:-1] - values[:, :-2, 1:-1])
+    return right, down

@@ -96,7 +96,7 @@ def tiles_of(width: int, height: int, side: int) -> Tiles:
 
 
 @cache
-def _to_coefficients(count: int) -> Array:
+def to_coefficients(count: int) -> Array:
     """The matrix from values at Chebyshev points to Chebyshev coefficients, shape (count, count)."""
     order, point = np.mgrid[0:count, 0:count]
     matrix: Array = np.cos(np.pi * order * (count - 0.5 - point) / count) * (2.0 / count)
@@ -128,7 +128,7 @@ def chebyshev_places(count: int = POINTS) -> Array:
 
 def coefficients_of(values: Array) -> Array:
     """Return the Chebyshev coefficients of samples by row and column, shape (..., count, count)."""
-    matrix = _to_coefficients(values.shape[-1])
+    matrix = to_coefficients(values.shape[-1])
     coefficients: Array = matrix @ values @ matrix.T
     return coefficients
 
