@@ -94,7 +94,7 @@ class DiskPainting:
         self._samples.make_tables()
         rings = self._rings()
         yield 0.1
-        marked_x, marked_y = self._marked_places()
+        slim, centre = self._slim_disk(), self._view.centre()
         sides = sides_for(self._width, self._height)
         waiting = tiles_of(self._width, self._height, sides[0])
         wanted = np.ones((len(waiting), self._crossings), dtype=bool)
@@ -104,7 +104,10 @@ class DiskPainting:
             for order, ring in rings.items():
                 touched = pool(ring.touched, side // TILE_SIDES[-1])
                 wanted[:, order] &= touched[waiting.row // side, waiting.column // side]
-            marked = self._marked(waiting, marked_x, marked_y)
+            # Samples may miss a disk that is seen from the edge; a whole one, hole and all, where it is small.
+            marked = self._marked(waiting, *slim)
+            if centre is not None and (side != TILE_SIDES[-1] or not self._samples.has_tables):
+                marked |= self._marked(waiting, *map(np.atleast_1d, centre))
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))
@@ -127,11 +130,8 @@ class DiskPainting:
         left = wanted.any(axis=1)
         yield from self._tracing.steps(waiting.select(left), wanted[left], done)
 
-    def _marked_places(self) -> tuple[Array, Array]:
-        """Return pixel coordinates of the hole's centre and, if it is slim, on the disk as flat space would show it.
-
-        Samples may miss a disk that is seen from the edge, or from afar; a broad one they cannot.
-        """
+    def _slim_disk(self) -> tuple[Array, Array]:
+        """Return pixel coordinates of places on the disk as flat space would show it, if it is slim."""
         radii = np.linspace(self._inner, self._outer, MARKED_CIRCLES)
         turn = np.arange(MARKED_PLACES) * (2.0 * math.pi / MARKED_PLACES)
         x, y = self._view.places_in_plane(np.repeat(radii, len(turn)), np.tile(turn, len(radii)))
@@ -139,14 +139,12 @@ class DiskPainting:
         x, y = x[known], y[known]
         if len(x) > 1 and math.sqrt(max(np.linalg.eigvalsh(np.cov(x, y))[0], 0.0)) > SLIM:
             x, y = x[:0], y[:0]
-        centre = self._view.centre()
-        if centre is not None:
-            x, y = np.append(x, centre[0]), np.append(y, centre[1])
-        seen = (x > -1.0) & (x < self._width + 1.0) & (y > -1.0) & (y < self._height + 1.0)
-        return x[seen], y[seen]
+        return x, y
 
     def _marked(self, tiles: Tiles, x: Array, y: Array) -> Mask:
-        """Return which tiles hold a marked place, shape (n,)."""
+        """Return which tiles hold any of some places given by pixel coordinates, shape (n,)."""
+        seen = (x > -1.0) & (x < self._width + 1.0) & (y > -1.0) & (y < self._height + 1.0)
+        x, y = x[seen], y[seen]
         held = np.zeros((self._height // tiles.side + 2, self._width // tiles.side + 2), dtype=bool)
         held[(y // tiles.side).astype(np.intp), (x // tiles.side).astype(np.intp)] = True
         marked: Mask = held[tiles.row // tiles.side, tiles.column // tiles.side]
@@ -191,9 +189,10 @@ class DiskPainting:
         self._planes.fill(order, tiles.select(filled[~simple]), coefficients[filled[~simple]], self._matter)
         if tiles.side == TILE_SIDES[-1] and order not in self._samples.rings:
             left = np.flatnonzero(~(good | empty))
-            near = near_annulus(u[left], 1.0 / self._outer, 1.0 / self._inner)
+            near = near_annulus(bent[left], self._bent.low, self._bent.high)
             near[marked[left]] = True
             tiles.select(left).put(self._tracing.asked[order], near)
+            empty[left] = ~near.any(axis=(1, 2))
         settled: Mask = good | empty
         return settled
 

@@ -160,6 +160,11 @@ class DiskSamples:
         return float(away.min()) < step + AROUND_SHADOW * math.asin(min(1.0, LARGEST_SHADOW / r))
 
     @property
+    def has_tables(self) -> bool:
+        """Whether there are tables: the shadow is no smaller than one of the smallest tiles."""
+        return bool(self._tables)
+
+    @property
     def rings(self) -> dict[int, RingTable]:
         """The tables of those images that are bands around the shadow, by order, counted from 0."""
         return {order: table for order, table in self._tables.items() if table.confined}
