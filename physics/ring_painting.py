@@ -39,6 +39,9 @@ PLACES, WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
 LOOKS, LOOKS_IN_PANORAMA = 1, 4
 BULGE, BESIDE_HOLE = 0.25, 2.0
 
+# Tiles so many times the largest's size from the band do not touch it, whatever its position angle.
+BEYOND = 2.0
+
 # Points along each side of a tile that say where its pixels are, if the highest coefficients of a polynomial through
 # them are below this share of the tile's size.
 NODES, SMOOTH = 5, 3e-4
@@ -114,16 +117,22 @@ class RingPainting:
     def __init__(self, survey: TileSurvey, table: RingTable) -> None:
         self._survey, self._table = survey, table
         self._width, self._height = survey.width, survey.height
-        (inner, _, outer, _), _ = table.band(survey.angle)
+        nearest, farthest = table.extent
+        reach = BEYOND * float(survey.size.max())
+        beside = (survey.away > nearest - reach) & (survey.away < farthest + reach)
+        close = np.flatnonzero(beside)
+        inner, outer = np.zeros((2, len(survey.away)))
+        (inner[close], _, outer[close], _), _ = table.band(survey.angle[close])
         first, _ = survey.extremes(inner)
         _, last = survey.extremes(outer)
         least, most = survey.extremes(survey.away - inner)
         around = survey.nearest < BESIDE_HOLE * survey.size
         slack = np.where(around, survey.size, BULGE * (most - least))
-        self._nearest = np.where(around, inner.min(), first) - slack
-        self._farthest = np.where(around, outer.max(), last) + slack
+        self._nearest = np.where(around, nearest, first) - slack
+        self._farthest = np.where(around, farthest, last) + slack
         self.touched: Mask = survey.farthest + survey.between > self._nearest
         self.touched &= survey.nearest - survey.between < self._farthest
+        self.touched &= survey.extremes(beside.astype(np.float64))[0] > 0.0
         """Which of the smallest tiles the band may touch, shape (rows, columns)."""
 
     def tiles(self) -> Tiles:

@@ -120,6 +120,12 @@ class RingTable:
         result[0, ~inside] = np.where(before[~inside], np.inf, -np.inf) if self.confined else np.nan
         return result
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """How near to the hole's direction and how far from it the rims of a `confined` image are, radians."""
+        inner, outer = self._band
+        return float(inner.real.min()), float(outer.real.max())
+
     def band(self, angle: Array) -> tuple[list[Array], Mask]:
         """Return at position angles how far the disk's inner rim is from the hole's direction, radians, and its slope
         along the position angle, the same for the outer rim, and whether they are well known; for an image that is
