@@ -214,7 +214,7 @@ def places_of_rays(rays: Rays, barrier: Barrier, times: Array, tolerance: float,
     span, time_of = span.ravel(), times.ravel()
     parts = [values.reshape(-1) for values in (found.u, found.u_slope, found.unwound)]
     for count, most in zip(NODE_COUNTS, (*LONGEST_TIMES, math.inf), strict=True):
-        fewest = (1 if count > NODE_COUNTS[0] else FEW_ENDED) if beyond else None  # few of the first go on with others
+        fewest = (1 if count > NODE_COUNTS[0] else FEW_ENDED) if beyond else None
         pairs = np.flatnonzero((span <= most) & ~known)
         if len(pairs) < FEW and count != NODE_COUNTS[-1]:
             continue
@@ -239,7 +239,7 @@ def _places(
     paths: _Paths, time: Array, rule: _Rule, tolerance: float, fewest: int | None
 ) -> tuple[Array, Array, Array, Mask, Index]:
     """Return u, du / dlambda and psi - W(u) after a time, no shorter than `paths` are followed, where that is known,
-    and which rays have fallen in before for certain: only with `follow` is it known of these."""
+    and which rays have fallen in before for certain: these are followed to their ends if they are `fewest` or more."""
     u, slope, lost = paths.nodes(rule)
     unwound, error = paths.unwound(rule, u, slope)
     place, rate = u[-1], slope[-1]
