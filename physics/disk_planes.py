@@ -94,7 +94,9 @@ class DiskPlanes:
         """Do what `fill` does for some tiles, from coefficients of shape (channels, n, points, points); `reach`: how
         much u changes at the most from a pixel's centre to its corners, (n,)."""
         base, _ = _polynomials(tiles.side, coefficients.shape[-1])
-        values: Channels = base @ coefficients @ base.T
+        # Of tiles that stick out of the picture no more than is in it.
+        down, across = base[: (self._height - tiles.row).max()], base[: (self._width - tiles.column).max()]
+        values: Channels = down @ coefficients @ across.T
         u = values[U].reshape(len(tiles), -1)
         low, high = u.min(axis=1), u.max(axis=1)
         # Whole tiles inside need no coverage; half a pixel's way to a rim is less than the steepest step.
@@ -107,7 +109,7 @@ class DiskPlanes:
             self._fill_rim(order, tiles.select(part), values[:, part], reach[part], matter)
 
     def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
-        """Write tiles that are wholly covered, from channels of shape (channels, n, side, side)."""
+        """Write tiles that are wholly covered, from channels of shape (channels, n, rows, columns)."""
         share = np.broadcast_to(np.float32(1.0), values[U].shape)
         for plane, channel in zip(self.planes[order], (*matter(values), share), strict=True):
             tiles.put(plane, channel)
@@ -115,16 +117,16 @@ class DiskPlanes:
     def _fill_rim(
         self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
-        """Write tiles with a rim in them from channels of shape (channels, n, side, side); `reach` as above."""
+        """Write tiles with a rim in them from channels of shape (channels, n, rows, columns); `reach` as above."""
         u, reach = values[U], reach[:, None, None]
         off = np.maximum(self._bent.low - u, u - self._bent.high)
         wholly = off <= -reach
-        rim, where = self._in_picture(tiles, np.flatnonzero((off < reach) != wholly))
+        rim, where = self._in_picture(tiles, np.flatnonzero((off < reach) != wholly), u.shape)
         channels = values.reshape(len(values), -1)
         right, below = slopes(values, rim)
         self._rims[order, matter].append((where, channels.take(rim, axis=1), right, below))
         if np.count_nonzero(wholly) < DENSE * wholly.size:
-            inside, where = self._in_picture(tiles, np.flatnonzero(wholly))
+            inside, where = self._in_picture(tiles, np.flatnonzero(wholly), u.shape)
             self._put(order, where, matter(channels.take(inside, axis=1)), 1.0)
             return
         np.clip(u, self._bent.low, self._bent.high, out=u)
@@ -133,11 +135,10 @@ class DiskPlanes:
         for plane, channel in zip(self.planes[order], (*found, wholly), strict=True):
             tiles.put(plane, channel, wholly)
 
-    def _in_picture(self, tiles: Tiles, places: Index) -> tuple[Index, Index]:
-        """Return those of some places, given by their numbers in (n, side, side), that are in the picture, and their
-        numbers there."""
-        tile, inside = np.divmod(places, tiles.side * tiles.side)
-        row, column = np.divmod(inside, tiles.side)
+    def _in_picture(self, tiles: Tiles, places: Index, shape: tuple[int, ...]) -> tuple[Index, Index]:
+        """Return those of some places, given by their numbers in `shape`, (n, rows, columns), that are in the picture,
+        and their numbers there."""
+        tile, row, column = np.unravel_index(places, shape)
         row, column = row + tiles.row[tile], column + tiles.column[tile]
         where = row * self._width + column
         known = (row < self._height) & (column < self._width)
@@ -182,12 +183,12 @@ class DiskPlanes:
 
 
 def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
-    """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, side, side)
-    at some places, given by their numbers in (n, side, side); none where a neighbour is not known."""
-    side = values.shape[-1]
+    """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, rows,
+    columns) at some places, given by their numbers in (n, rows, columns); none where a neighbour is not known."""
+    rows, columns = values.shape[-2:]
     flat = values.reshape(len(values), -1)
-    step, at = np.array([[1], [side]]), np.stack([place % side, place // side % side])
-    before, after = at > 0, at < side - 1  # one only at the tile's own edge
+    step, at = np.array([[1], [columns]]), np.stack([place % columns, place // columns % rows])
+    before, after = at > 0, at < np.array([[columns - 1], [rows - 1]])  # one only at the tile's own edge
     change = flat.take(place + step * after, axis=1) - flat.take(place - step * before, axis=1)
     change[PHI] = nearest_turn(change[PHI])
     change = change / (1.0 + (before & after))
