@@ -9,8 +9,9 @@ itself, so s = asinh(delta / w_k), brought to the same range at all position ang
 psi are coordinates in which one regular grid resolves all of the image at once, sky side and shadow side alike.
 
 Lagrange's interpolation among 4 x 4 of its points answers where the differences that it leaves out are small against
-what a pixel spans; elsewhere the table has no answer, and rays are traced. Of an image that is a band around the shadow
-the table also knows the rims, as curves over psi.
+what a pixel spans; elsewhere the table has no answer, which `ring_tracing` makes a finer grid for if it is too much of
+the disk, and then rays are traced. Of an image that is a band around the shadow the table also knows the rims, as
+curves over psi.
 """
 
 from __future__ import annotations

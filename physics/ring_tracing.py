@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Making the tables of a disk's later images: rays around the shadow's edge of a FIDO's sky."""
+"""Making the tables of a disk's later images (`ring_table`) from rays around the shadow's edge in a FIDO's sky.
+
+A few scouts tell where the images are, then each gets its grid. A table that leaves too much of its image open gets a
+grid twice as fine: by rays in the cells that were not good enough, by interpolation elsewhere.
+"""
 
 from __future__ import annotations
 
