@@ -122,7 +122,7 @@ class RingPainting:
         beside = (survey.away > nearest - reach) & (survey.away < farthest + reach)
         close = np.flatnonzero(beside)
         inner, outer = np.zeros((2, len(survey.away)))
-        (inner[close], _, outer[close], _), _ = table.band(survey.angle[close])
+        (inner[close], outer[close]), _ = table.band(survey.angle[close])
         first, _ = survey.extremes(inner)
         _, last = survey.extremes(outer)
         least, most = survey.extremes(survey.away - inner)
@@ -214,7 +214,7 @@ class RingPainting:
         x, y = np.broadcast_arrays(tiles.column[:, None, None] + steps, tiles.row[:, None, None] + steps[:, None])
         light, *momenta = self._survey.view.light_and_momenta(x.ravel(), y.ravel())
         away, angle = position_angles(light)
-        (inner, _, outer, _), known = self._table.band(angle)
+        (inner, outer), known = self._table.band(angle)
         values = np.stack([away - inner, away - outer, away, angle, *momenta]).reshape(6, *x.shape)
         return values, known.reshape(x.shape)
 

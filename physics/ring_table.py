@@ -64,13 +64,13 @@ class RingTable:
         on_disk = (u > self._rims[0]) & (u < self._rims[1])
         self.answered = float(good[on_disk].mean()) if on_disk.any() else 1.0
         """The share of the table's places on the disk that it answers for."""
-        self._open: Mask = _cells(~on_disk | good)
-        self._good = np.ascontiguousarray(~_cells(good)).ravel()
+        self._open = ~_cells(~on_disk | good)
+        self._good = _cells(good).ravel()
         placed = placed[-AROUND[0] :][: self._angles]
         rims = [_Rim.of(values[0][:, 1:-1], placed, level, grid, needs) for level in self._rims]
         known = rims[0].known & rims[1].known
-        self._band = _pairs([each[around] for rim in reversed(rims) for each in (rim.away, rim.slope)])
-        self._band_known = np.lib.stride_tricks.sliding_window_view(known[around], len(AROUND)).all(axis=1)
+        self._band = _pairs([rim.away[around] for rim in reversed(rims)])
+        self._band_known = _cells(known[around])
         # Rays at the ends that are not known are of no disk.
         ends_inside = not (u[:, :2] < self._rims[1]).any()
         ends_outside = not (u[:, -2:] >= self._rims[0]).any()
@@ -124,13 +124,12 @@ class RingTable:
     @property
     def extent(self) -> tuple[float, float]:
         """How near to the hole's direction and how far from it the rims of a `confined` image are, radians."""
-        inner, outer = self._band
-        return float(inner.real.min()), float(outer.real.max())
+        inner, outer = _unpaired(self._band)
+        return float(inner.min()), float(outer.max())
 
     def band(self, angle: Array) -> tuple[list[Array], Mask]:
-        """Return at position angles how far the disk's inner rim is from the hole's direction, radians, and its slope
-        along the position angle, the same for the outer rim, and whether they are well known; for an image that is
-        `confined`."""
+        """Return at position angles how far the disk's inner rim and its outer rim are from the hole's direction,
+        radians, and whether they are well known; for an image that is `confined`."""
         row, _, found = self._around(angle, self._band)
         return found, self._band_known.take(row)
 
@@ -147,11 +146,11 @@ class RingTable:
 
 
 def _cells(good: Mask) -> Mask:
-    """Return which cells, shape (angles, cells), have any of the nodes not good that they are interpolated among."""
+    """Return which cells have all of the nodes good that they are interpolated among, along every axis."""
     for axis, size in enumerate(good.shape):
         last = size - len(AROUND) + 1
         good = np.logical_and.reduce([good[(slice(None),) * axis + (slice(i, last + i),)] for i in range(len(AROUND))])
-    return ~good
+    return good
 
 
 def _pairs(values: Sequence[Array]) -> list[Pairs]:
@@ -170,8 +169,6 @@ class _Rim:
 
     away: Array
     """Angle from the hole's direction, radians; NaN where there is no such rim."""
-    slope: Array
-    """Of that along the position angle."""
     known: Mask
     """Whether it is known to a small part of a pixel between the position angles, too."""
 
@@ -182,12 +179,11 @@ class _Rim:
         edge, scale, low, step = grid
         column, first = _falls_to(u, level)
         away = edge + scale * np.sinh(low + step * column)
-        slope = (np.roll(away, -1) - np.roll(away, 1)) * (len(away) / (4.0 * math.pi))
         wide = np.arange(-2, len(away) + 2) % len(away)
         with np.errstate(invalid="ignore"):
             known = AROUND_ERROR * np.abs(np.diff(away[wide], 4)) < needs.pixel_error * needs.pixel  # NaN: False
         nodes = first[:, None] + np.array(AROUND)
-        return cls(away, slope, known & np.take_along_axis(placed, nodes, axis=1).all(axis=1))
+        return cls(away, known & np.take_along_axis(placed, nodes, axis=1).all(axis=1))
 
 
 def _falls_to(u: Array, level: float) -> tuple[Array, Index]:

@@ -18,8 +18,7 @@ from .observer import Observer
 from .rays import Array, rays_from_triad
 from .ring_grid import SCALE_ANGLES, SHARES, Draft, Needs, between
 from .ring_table import RingTable
-from .sphere import cos_sin
-from .trapped import around_hole, edge_angles
+from .trapped import all_around, around_hole, edge_angles
 
 Index = NDArray[np.intp]
 
@@ -77,9 +76,7 @@ class _Sky:
     def __init__(self, spin: float, fido: Observer, count: int, needs: Needs, edge_about: Array) -> None:
         """`count`: how many crossings of a ray are of interest."""
         self._spin, self._fido, self._needs, self._count = spin, fido, needs, count
-        self._aside, self._up = cos_sin(
-            np.linspace(0.0, 2.0 * math.pi, MOST_ANGLES, endpoint=False, dtype=np.float64)
-        )
+        self._aside, self._up = all_around(MOST_ANGLES)
         error = EDGE_ERROR * needs.pixel * math.exp(-math.pi * max(0, count - 1 - THIRD))
         place = np.arange(MOST_ANGLES) * (len(edge_about) / MOST_ANGLES)
         near = np.interp(place, np.arange(len(edge_about)), edge_about, period=len(edge_about))

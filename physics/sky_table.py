@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from .observer import Observer
 from .rays import Array, rays_from_triad
 from .shot import WarpMapParameters
-from .sphere import by_component, cos_sin
+from .sphere import by_component
 from .tracer import BLOCK_SIZE, Fate, trace_block
-from .trapped import around_hole, edge_angles
+from .trapped import all_around, around_hole, edge_angles
 
 # Position angles of the grid, and the step of s.
 ANGLES = 512
@@ -63,7 +63,7 @@ def sky_table_steps(parameters: WarpMapParameters) -> Generator[float, None, Sky
     """
     place = spin, r, theta, error, tolerance, method = _place(parameters)
     fido = Observer.fido(r, theta, 0.0)
-    aside, up = cos_sin(np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False, dtype=np.float64))
+    aside, up = all_around(ANGLES)
     edge = edge_angles(spin, fido, aside, up, EDGE_ERROR)
     closest = CLOSEST * float(edge.max())
     first = math.log(closest) + closest

@@ -128,6 +128,11 @@ def edge_function(rays: Rays) -> Array:
         return np.where(rays.escapes, margin / bound, -1.0)
 
 
+def all_around(count: int) -> tuple[Array, Array]:
+    """Return cosine and sine of so many position angles at equal steps, for `around_hole`, shape (count,)."""
+    return cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
+
+
 def around_hole(away: Array, aside: Array, up: Array) -> Array:
     """Return unit vectors on a FIDO's triad, shape (..., 3), at angles from the hole's direction, in radians, towards
     position angles with cosine `aside` (theta-hat) and sine `up` (phi-hat)."""

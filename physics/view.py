@@ -23,9 +23,9 @@ from .rays import (
     redshift_vector,
 )
 from .shot import WarpMapParameters
-from .sphere import cos_sin, spherical_triad
+from .sphere import spherical_triad
 from .tracer import BLOCK_SIZE
-from .trapped import around_hole, edge_angles, edge_function
+from .trapped import all_around, around_hole, edge_angles, edge_function
 
 # Points on the shadow's outline, for the square root of the picture's width and height in pixels. Chords between n
 # points stray from it by (2 pi / n)^2 / 8 of its radius: 0.05 pixels where that is width and height together. What the
@@ -126,15 +126,14 @@ class View:
 
     def outline(self) -> tuple[Array, Array]:
         """Return map pixel coordinates along the shadow's edge, in order, shape (n,); NaN where not in view."""
-        aside, up = _around(len(self.edge_about))
-        return self._pixels(around_hole(self.edge_about, aside, up))
+        return self._pixels(around_hole(self.edge_about, *all_around(len(self.edge_about))))
 
     @cached_property
     def edge_about(self) -> Array:
         """About how far the shadow's edge is from the hole's direction at equal steps of position angle, radians."""
         count = math.ceil(OUTLINE_DENSITY * math.sqrt((self._camera.width + self._camera.height) / self._per_pixel))
         fido = Observer.fido(self._observer.r, self._observer.theta, self._observer.phi)
-        return edge_angles(self._spin, fido, *_around(count), OUTLINE_ERROR * self._pixel_angle)
+        return edge_angles(self._spin, fido, *all_around(count), OUTLINE_ERROR * self._pixel_angle)
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""
@@ -146,10 +145,5 @@ class View:
         seen /= (1.0 + beta * along)[:, None]
         x, y = self._camera.pixels(seen @ self._camera_to_triad.T)
         return x / self._per_pixel, y / self._per_pixel
-
-
-def _around(count: int) -> tuple[Array, Array]:
-    """Return cosine and sine of so many position angles at equal steps."""
-    return cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
 
 
