@@ -7,6 +7,7 @@ import contextlib
 import io
 import os
 import re
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
@@ -14,11 +15,33 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from . import exr_header
 from .errors import ImageFileError
+
+
+@contextlib.contextmanager
+def _own_symbols() -> Iterator[None]:
+    """Let a library that is loaded within the block call its own functions before others of the same names.
+
+    Blender's executable has an OpenEXR of its own among its global symbols, of another version than the wheel's.
+    Calling that one crashes Blender 4.5. Only glibc has the flag; macOS and Windows bind each library to its own
+    symbols anyway.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    flags = sys.getdlopenflags()
+    sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(flags)
+
+
+with _own_symbols():
+    import OpenEXR
 
 PathLike = str | os.PathLike[str]
 
