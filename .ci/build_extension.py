@@ -66,9 +66,7 @@ def current_platform() -> str:
     machine = platform.machine().lower()
     name = f"{system}-{ {'x86_64': 'x64', 'amd64': 'x64', 'aarch64': 'arm64'}.get(machine, machine) }"
     if name not in WHEEL_TAGS:
-        sys.exit(
-            f"There are no OpenEXR wheels for this machine ({name}); choose from: {', '.join(WHEEL_TAGS)}."
-        )
+        sys.exit(f"There are no OpenEXR wheels for this machine ({name}); choose from: {', '.join(WHEEL_TAGS)}.")
     return name
 
 
@@ -120,19 +118,13 @@ def toml_list(key: str, values: Iterable[str]) -> str:
 
 def ignore(_folder: str, names: list[str]) -> set[str]:
     """What is never shipped: caches, tests, and files that editors and systems hide."""
-    return {
-        name
-        for name in names
-        if name in ("__pycache__", "tests") or name.startswith(".") or name.endswith(".pyc")
-    }
+    return {name for name in names if name in ("__pycache__", "tests") or name.startswith(".") or name.endswith(".pyc")}
 
 
 def stage(folder: Path, platforms: Iterable[str]) -> None:
     """Lay out in an empty folder what goes into the zip for these platforms."""
     if manifest()["version"] != pyproject()["project"]["version"]:
-        sys.exit(
-            "blender_addon/blender_manifest.toml and pyproject.toml give different versions; make them equal."
-        )
+        sys.exit("blender_addon/blender_manifest.toml and pyproject.toml give different versions; make them equal.")
     shutil.copytree(ADDON, folder, ignore=ignore, dirs_exist_ok=True)
     shutil.copytree(PHYSICS, folder / "physics", ignore=ignore)
     shutil.copy(ROOT / "LICENSE", folder)

@@ -90,17 +90,11 @@ def compare(folder: Path, sky: np.ndarray) -> None:
         difference[BALL_REGION] = 0.0
         ball = np.all(np.abs(picture[BALL_REGION] - BALL_COLOUR) < 1e-3, axis=-1).sum()
         shadow = np.count_nonzero(warp_map.visibility == 0.0)
-        print(
-            f"frame {number}: largest difference {difference.max():.1e}, shadow {shadow} px, ball {ball} px"
-        )
+        print(f"frame {number}: largest difference {difference.max():.1e}, shadow {shadow} px, ball {ball} px")
         if picture.shape[:2] != SIZE[::-1] or difference.max() > TOLERANCE:
-            sys.exit(
-                f"Frame {number} differs from the reference by {difference.max():.3g}, allowed {TOLERANCE}."
-            )
+            sys.exit(f"Frame {number} differs from the reference by {difference.max():.3g}, allowed {TOLERANCE}.")
         if shadow < 100 or ball < 50:
-            sys.exit(
-                "The scene does not show what it should: a shadow of 100 pixels and a ball of 50 at least."
-            )
+            sys.exit("The scene does not show what it should: a shadow of 100 pixels and a ball of 50 at least.")
     if np.array_equal(read_warp_map(maps[0]).theta, read_warp_map(maps[1]).theta):
         sys.exit("The camera moves, but both frames have the same map.")
 
@@ -176,9 +170,7 @@ def main() -> None:
         orthographic = "import bpy; bpy.context.scene.camera.data.type = 'ORTHO'"
         output = blender.run("-b", scene, "--python-expr", orthographic, "-f", "1", status=1)
         if "rthographic" not in output:
-            sys.exit(
-                f"{output}\nThe render failed, as it should, but did not say that the camera is orthographic."
-            )
+            sys.exit(f"{output}\nThe render failed, as it should, but did not say that the camera is orthographic.")
         check_lens(blender, scene)
     print("End to end: passed.")
 

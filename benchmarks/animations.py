@@ -53,9 +53,7 @@ def moves(frames: int, spin: float, radius: float) -> dict[str, Frames]:
     return {
         "circular orbit, tracking": [shot(azimuth=2.0 * math.pi * part) for part in share],
         "turn of the camera": [turned(shot(), 0.5 * part) for part in share],
-        "zoom": [
-            shot(camera=physics.PerspectiveCamera.from_field_of_view(*SIZE, 1.0 - 0.5 * part)) for part in share
-        ],
+        "zoom": [shot(camera=physics.PerspectiveCamera.from_field_of_view(*SIZE, 1.0 - 0.5 * part)) for part in share],
         "change of speed": [shot(motion="velocity", velocity=(0.0, 0.6 * part, 0.0)) for part in share],
         "move in r and theta": [raised(shot(radius=radius * (1.0 + 0.4 * part)), 0.5 * part) for part in share],
     }
@@ -69,9 +67,7 @@ def turned(parameters: physics.WarpMapParameters, angle: float) -> physics.WarpM
 
 def raised(parameters: physics.WarpMapParameters, elevation: float) -> physics.WarpMapParameters:
     position = (parameters.radius * math.cos(elevation), 0.0, parameters.radius * math.sin(elevation))
-    return dataclasses.replace(
-        parameters, camera_position=position, camera_to_hole=physics.looking_at_hole(position)
-    )
+    return dataclasses.replace(parameters, camera_position=position, camera_to_hole=physics.looking_at_hole(position))
 
 
 def together_and_alone(name: str, shots: Frames) -> Iterator[Row]:

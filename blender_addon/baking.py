@@ -67,9 +67,7 @@ class Summary:
         if self.baked:
             parts.append(f"baked {_count(len(self.baked), 'warp map')}")
         if self.reused:
-            parts.append(
-                f"{_count(len(self.reused), 'map')} still {'holds' if len(self.reused) == 1 else 'hold'}"
-            )
+            parts.append(f"{_count(len(self.reused), 'map')} still {'holds' if len(self.reused) == 1 else 'hold'}")
         text = (", ".join(parts) or "Nothing to bake").capitalize()
         if self.folder is not None and self.folder.is_temporary:
             text += f"; this file is not saved yet, so the maps are in a temporary folder: {self.folder.path}"
@@ -134,9 +132,7 @@ def forget_shared_rays() -> None:
     _baker = physics.MapBaker()
 
 
-def provide_map(
-    scene: bpy.types.Scene, path: Path, parameters: "physics.WarpMapParameters", frame: int
-) -> None:
+def provide_map(scene: bpy.types.Scene, path: Path, parameters: "physics.WarpMapParameters", frame: int) -> None:
     """Make sure, for a render, that a frame's map holds.
 
     Raises
@@ -162,9 +158,7 @@ def provide_map(
             claims.beat()
 
 
-def _wait_for_claim(
-    claims: claim.Claims, path: Path, parameters: "physics.WarpMapParameters", what: str
-) -> None:
+def _wait_for_claim(claims: claim.Claims, path: Path, parameters: "physics.WarpMapParameters", what: str) -> None:
     """Claim a map once the process that is baking it has ended, or is found dead.
 
     Raises

@@ -39,9 +39,7 @@ def _number(name: str, description: str, default: float, low: float = -1e6, high
 
 
 def _factor(name: str, description: str, default: float) -> SocketSpec:
-    return SocketSpec(
-        name, "NodeSocketFloat", description, default=default, minimum=0.0, maximum=1.0, subtype="FACTOR"
-    )
+    return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=0.0, maximum=1.0, subtype="FACTOR")
 
 
 BEHIND, COLOURS, TEXTURE = "Behind", "Colours", "Texture"
@@ -171,9 +169,7 @@ def image_group(picture: bool) -> StampedGroup:
 
     def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
         inputs = _disk_inputs(sockets)
-        light, through = disk_nodes.build_image(
-            builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture
-        )
+        light, through = disk_nodes.build_image(builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture)
         return {LIGHT: light, THROUGH: through}
 
     inputs = (

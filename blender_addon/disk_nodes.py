@@ -344,9 +344,7 @@ def _tinted_light(
     return builder.vector_math("MULTIPLY", light, gain)
 
 
-def _brightness(
-    builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, flux: Socket, shift: Socket
-) -> Socket:
+def _brightness(builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, flux: Socket, shift: Socket) -> Socket:
     brightness = builder.math("POWER", flux, inputs.falloff)
     beamed = builder.math("POWER", shift, shared.brightness_power)
     return builder.math("MULTIPLY", builder.math("MULTIPLY", brightness, beamed), shared.brightness)

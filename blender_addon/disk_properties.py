@@ -55,7 +55,12 @@ def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
 
 def _amount(name: str, field: str, description: str) -> "bpy.types.FloatProperty":
     return bpy.props.FloatProperty(
-        name=name, description=description, default=getattr(_LOOK, field), min=0.0, max=1.0, subtype="FACTOR",
+        name=name,
+        description=description,
+        default=getattr(_LOOK, field),
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
         update=_changed,
     )
 
@@ -178,12 +183,8 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     opacity: _amount("Opacity", "opacity", "How much the densest parts hide what is behind")
     streaks: _amount("Streaks", "streaks", "How much the streaks thin the disk out")
     clumps: _amount("Clumps", "clumps", "How much the clumps thin the disk out")
-    inner_softness: _amount(
-        "Inner Softness", "inner_softness", "Share of the disk over which its inner edge fades in"
-    )
-    outer_softness: _amount(
-        "Outer Softness", "outer_softness", "Share of the disk over which its outer edge fades out"
-    )
+    inner_softness: _amount("Inner Softness", "inner_softness", "Share of the disk over which its inner edge fades in")
+    outer_softness: _amount("Outer Softness", "outer_softness", "Share of the disk over which its outer edge fades out")
     gain: bpy.props.FloatProperty(
         name="Contrast of Light",
         description="How much brighter dense streaks are than thin ones",

@@ -220,9 +220,7 @@ def _remove_drivers(tree: bpy.types.NodeTree, prefix: str) -> None:
 # --- settings -------------------------------------------------------------------------------------
 
 
-def _geometry(
-    hole: bpy.types.Object, spin: float, disk: "physics.Disk"
-) -> dict[str, tuple[float, str | None]]:
+def _geometry(hole: bpy.types.Object, spin: float, disk: "physics.Disk") -> dict[str, tuple[float, str | None]]:
     """Values of the sockets that say what the disk is, and the paths that they follow where those are animated."""
     animated = animated_paths(hole)
     turning = disk_animation.SPIN in animated

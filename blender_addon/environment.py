@@ -69,9 +69,7 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
         return (0.0, 0.0, 0.0), None
     inputs = mapping.inputs
     if any(each.is_linked for each in inputs if each.name != "Vector"):
-        raise SceneError(
-            f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}."
-        )
+        raise SceneError(f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}.")
     has_location = mapping.vector_type in {"POINT", "TEXTURE"}
     moves = has_location and any(inputs["Location"].default_value)
     if moves or tuple(inputs["Scale"].default_value) != (1.0, 1.0, 1.0):
@@ -95,9 +93,7 @@ def read_world(scene: bpy.types.Scene) -> Sky:
     """
     world = scene.get(WORLD_BEFORE, scene.world)
     if world is None:
-        raise SceneError(
-            f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.'
-        )
+        raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
     uses_nodes = bpy.app.version >= (5, 0) or world.use_nodes
     if not uses_nodes or world.node_tree is None:
         raise SceneError(f'World "{world.name}" is a plain colour and has no environment: {_HELP}.')
@@ -105,9 +101,7 @@ def read_world(scene: bpy.types.Scene) -> Sky:
     output = world.node_tree.get_output_node(engine)
     surface = _source(output.inputs["Surface"]) if output is not None else None
     if surface is None or surface.node.type != "BACKGROUND":
-        raise SceneError(
-            f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.'
-        )
+        raise SceneError(f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.')
     background = surface.node
     colour = _source(background.inputs["Color"])
     if colour is None:
@@ -181,9 +175,7 @@ def check_image(image: bpy.types.Image) -> None:
         return
     if image.source == "FILE" and min(image.size) <= 0:
         path = bpy.path.abspath(image.filepath, library=image.library)
-        raise SceneError(
-            f'The sky image "{image.name}" cannot be loaded from {path}: choose a file that exists.'
-        )
+        raise SceneError(f'The sky image "{image.name}" cannot be loaded from {path}: choose a file that exists.')
 
 
 # --- the built-in sky -----------------------------------------------------------------------------

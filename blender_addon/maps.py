@@ -110,9 +110,7 @@ def map_path(scene: bpy.types.Scene, hole_name: str, size: tuple[int, int], fram
     return folder(scene).path / file_name(scene, hole_name, size, frame)
 
 
-def exit_map_path(
-    scene: bpy.types.Scene, hole_name: str, parameters: "physics.WarpMapParameters", frame: int
-) -> Path:
+def exit_map_path(scene: bpy.types.Scene, hole_name: str, parameters: "physics.WarpMapParameters", frame: int) -> Path:
     """Where the exit map of a frame lies, or will lie.
 
     Its name contains the hash of what it is made from: Cycles keeps textures by their names, and a map that is baked

@@ -166,9 +166,7 @@ class TreeBuilder:
         self.feed(node.inputs[0], colour)
         return node.outputs[0], node.outputs[1], node.outputs[2], node.outputs[3]
 
-    def combine_colour(
-        self, red: Value, green: Value, blue: Value, alpha: Value = 1.0, label: str = ""
-    ) -> Socket:
+    def combine_colour(self, red: Value, green: Value, blue: Value, alpha: Value = 1.0, label: str = "") -> Socket:
         """Colour of four floats."""
         node = self.node("CompositorNodeCombineColor", label)
         node.mode = "RGB"
@@ -211,9 +209,7 @@ class TreeBuilder:
         self.feed(node.inputs["UV"], uv)
         return node.outputs[0]
 
-    def scale_by(
-        self, image: Value, factor: Value, interpolation: str = "Nearest", label: str = ""
-    ) -> Socket:
+    def scale_by(self, image: Value, factor: Value, interpolation: str = "Nearest", label: str = "") -> Socket:
         """Scale an image about its centre by one factor for both axes."""
         node = self._scale(image, interpolation, label)
         if SETTINGS_ARE_SOCKETS:

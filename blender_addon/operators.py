@@ -330,9 +330,7 @@ class BakeOperator:
         global running
         running = progress
         context.window_manager.progress_update(progress.fraction)
-        context.workspace.status_text_set(
-            f"{self.doing}: {progress.text}, {progress.fraction:.0%} done.  Esc stops."
-        )
+        context.workspace.status_text_set(f"{self.doing}: {progress.text}, {progress.fraction:.0%} done.  Esc stops.")
         _redraw(context)
 
     def _end(self, context: bpy.types.Context, result: set[str]) -> set[str]:

@@ -98,8 +98,7 @@ def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
         )
     if holes(scene):
         raise SceneError(
-            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is '
-            "rendered."
+            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is rendered.'
         )
     raise SceneError(
         f'Scene "{scene.name}" contains no black hole: add one with Add > Black Hole, or take the compositor '
@@ -147,9 +146,7 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
-        raise SceneError(
-            f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.'
-        )
+        raise SceneError(f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.')
     if keep_scale and lengths.max() - lengths.min() > MATRIX_TOLERANCE * lengths.max():
         raise SceneError(
             f'{what} "{evaluated.name}" has a different scale along x, y and z: make all three the same (its '
@@ -158,13 +155,10 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
     axes = matrix[:3, :3] / lengths
     if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
         raise SceneError(
-            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale '
-            "uniform."
+            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.'
         )
     if np.linalg.det(axes) < 0.0:
-        raise SceneError(
-            f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.'
-        )
+        raise SceneError(f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.')
     # the nearest rotation, free of float32's rounding
     left, _, right = np.linalg.svd(axes)
     return Pose(matrix[:3, 3], left @ right, float(lengths.mean()))
@@ -281,9 +275,7 @@ def camera_model(
                 "perspective camera."
             )
         limits = ("latitude_min", "latitude_max", "longitude_min", "longitude_max")
-        return physics.PanoramaCamera(
-            width, height, **{name: _panorama_setting(camera, name) for name in limits}
-        )
+        return physics.PanoramaCamera(width, height, **{name: _panorama_setting(camera, name) for name in limits})
     if kind_of_lens == "ORTHO":
         raise SceneError(
             f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the '
@@ -331,9 +323,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     _check_evaluated(hole, depsgraph)
     camera = scene.camera
     if camera is None or camera.type != "CAMERA":
-        raise SceneError(
-            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.'
-        )
+        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
 
     evaluated_hole = hole.evaluated_get(depsgraph)
     evaluated_camera = camera.evaluated_get(depsgraph)

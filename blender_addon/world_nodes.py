@@ -96,9 +96,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         column = builder.math("MULTIPLY_ADD", across, header.width, -0.5)
         left = builder.math("FLOOR", column)
         share_x = builder.math("SUBTRACT", column, left)
-        columns = [
-            builder.math("DIVIDE", builder.math("ADD", left, shift), header.width) for shift in (0.5, 1.5)
-        ]
+        columns = [builder.math("DIVIDE", builder.math("ADD", left, shift), header.width) for shift in (0.5, 1.5)]
     with builder.frame("The shadow's edge"):
         edges = [_texel(builder, each, 0.5)[1] for each in columns]
         delta = builder.math("SUBTRACT", away, builder.select(share_x, *edges), label="From the edge")
@@ -161,9 +159,7 @@ def _seen_by_fido(builder: TreeBuilder, looking: Socket, header: _Header) -> Soc
     return builder.vector_math("ADD", contracted, builder.vector_scale(header.motion, factor))
 
 
-def _origin(
-    builder: TreeBuilder, header: _Header, columns: list[Socket], share_x: Socket, delta: Socket
-) -> Socket:
+def _origin(builder: TreeBuilder, header: _Header, columns: list[Socket], share_x: Socket, delta: Socket) -> Socket:
     """The vector towards the light's origin, mixed of four texels; shorter than 1."""
     positive = builder.math("MAXIMUM", delta, _LEAST_DISTANCE)
     place = builder.math("ADD", builder.math("LOGARITHM", positive, math.e), positive)

@@ -110,9 +110,7 @@ def _public_name(
     )
 
 
-def _plain_stars(
-    _app: Sphinx, _what: str, _name: str, _object: object, _options: object, lines: list[str]
-) -> None:
+def _plain_stars(_app: Sphinx, _what: str, _name: str, _object: object, _options: object, lines: list[str]) -> None:
     """Have a shape like (*shape, 3) printed, where reStructuredText would begin emphasis."""
     lines[:] = [re.sub(r"\(\*(?=\w)", r"(\\*", line) for line in lines]
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The figures of the physics page, computed with `physics` each time that the manual is built.
 
-    PYTHONPATH=. python docs/figures.py FOLDER
+PYTHONPATH=. python docs/figures.py FOLDER
 """
 
 import math

@@ -145,9 +145,7 @@ def accuracy_steps(
     return _report(path, pixels, chosen, visibility, rays, environment_width, judged)
 
 
-def _portion(
-    steps: Generator[float, None, Any], start: float, share: float
-) -> Generator[float, None, Any]:
+def _portion(steps: Generator[float, None, Any], start: float, share: float) -> Generator[float, None, Any]:
     """Run a part of the work, whose fractions become `share` of the whole from `start` on."""
     while True:
         try:

@@ -165,10 +165,13 @@ class PrintedSystem:
         sin_theta, cos_theta, sin_phi, cos_phi = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
         outward, south, east = slope[R], r * slope[THETA], r * sin_theta * slope[PHI]
         across = outward * sin_theta + south * cos_theta
-        vector: Array = np.stack([
-            across * cos_phi - east * sin_phi,
-            across * sin_phi + east * cos_phi,
-            outward * cos_theta - south * sin_theta,
-        ], axis=-1)
+        vector: Array = np.stack(
+            [
+                across * cos_phi - east * sin_phi,
+                across * sin_phi + east * cos_phi,
+                outward * cos_theta - south * sin_theta,
+            ],
+            axis=-1,
+        )
         unit: Array = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
         return unit

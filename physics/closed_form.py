@@ -24,9 +24,7 @@ def sky_directions(rays: Rays, barrier: Barrier, tolerance: float) -> tuple[Arra
     return direction.T, answered
 
 
-def radial_integrals(
-    rays: Rays, barrier: Barrier, wanted: NDArray[np.bool_], tolerance: float
-) -> tuple[Array, Array]:
+def radial_integrals(rays: Rays, barrier: Barrier, wanted: NDArray[np.bool_], tolerance: float) -> tuple[Array, Array]:
     """Return Mino time to infinity and psi of the rays wanted, shape (n,); NaN elsewhere and for too many nodes."""
     time, psi = np.full((2, len(rays)), np.nan)
     for members, integrals in (

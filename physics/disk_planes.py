@@ -114,9 +114,7 @@ class DiskPlanes:
         for plane, channel in zip(self.planes[order], (*matter(values), share), strict=True):
             tiles.put(plane, channel)
 
-    def _fill_rim(
-        self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf
-    ) -> None:
+    def _fill_rim(self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf) -> None:
         """Write tiles with a rim in them from channels of shape (channels, n, rows, columns); `reach` as above."""
         u, reach = values[U], reach[:, None, None]
         off = np.maximum(self._bent.low - u, u - self._bent.high)

@@ -70,10 +70,13 @@ def random_picture(pattern: Pattern, seed: int, width: int = TEXTURE_WIDTH, heig
 
 def disk_texture(seed: int = 1, width: int = TEXTURE_WIDTH, height: int = TEXTURE_HEIGHT) -> Array:
     """Return streaks and clumps, shape (height, width, 2), 0 to 1; row 0 at the inner rim, column 0 at azimuth 0."""
-    return np.stack([
-        random_picture(STREAKS, 2 * seed, width, height),
-        random_picture(CLUMPS, 2 * seed + 1, width, height),
-    ], axis=-1)
+    return np.stack(
+        [
+            random_picture(STREAKS, 2 * seed, width, height),
+            random_picture(CLUMPS, 2 * seed + 1, width, height),
+        ],
+        axis=-1,
+    )
 
 
 def look_up(texture: Array, radius: Array, phi: Array, inner: float, outer: float) -> Array:

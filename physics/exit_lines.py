@@ -30,9 +30,7 @@ QUADRATURE, STEPS = "gauss-legendre", "cash-karp"
 EXIT_METHODS = (QUADRATURE, STEPS)
 
 
-def exit_lines(
-    rays: Rays, tolerance: float, method: str = QUADRATURE
-) -> tuple[NDArray[np.uint8], Array, Array]:
+def exit_lines(rays: Rays, tolerance: float, method: str = QUADRATURE) -> tuple[NDArray[np.uint8], Array, Array]:
     """Return where rays from one camera come from, as lines in space.
 
     Parameters

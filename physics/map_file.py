@@ -50,9 +50,7 @@ class MapFormat:
         """The whole value of `umbraFormat`."""
         return f"{self.name} {self.version}"
 
-    def write(
-        self, path: PathLike, planes: Planes, metadata: Mapping[str, Any], further: Sequence[str] = ()
-    ) -> None:
+    def write(self, path: PathLike, planes: Planes, metadata: Mapping[str, Any], further: Sequence[str] = ()) -> None:
         """Write R, G, B and A, float32 of one shape each, with their header, whole or not at all.
 
         `further` are the values of `attributes`.

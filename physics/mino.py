@@ -82,14 +82,16 @@ class MinoSystem(ABC):
         self.state = state
         self._spin = rays.spin
         # Rotation rate psi' = u (2 a - a^2 b u) / (1 - 2 u + a^2 u^2), for the backward ray with its sign turned.
-        self._constants = np.vstack([
-            unit,
-            rays.carter,
-            np.full(len(rays), -2.0 * rays.spin),
-            rays.spin**2 * rays.b,
-            1.0 / (np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0)) + 1.0),
-            rates,
-        ])
+        self._constants = np.vstack(
+            [
+                unit,
+                rays.carter,
+                np.full(len(rays), -2.0 * rays.spin),
+                rays.spin**2 * rays.b,
+                1.0 / (np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0)) + 1.0),
+                rates,
+            ]
+        )
         # A last step that ends short of infinity, or beyond, is corrected to first order; what that leaves is
         # of the order of the square of the distance.
         self._arrival = 0.1 * math.sqrt(tolerance)
@@ -234,9 +236,7 @@ class DirectRays(MinoSystem):
         return x
 
 
-def direct_polynomial(
-    rays: Rays, barrier: Barrier, inward: bool = False
-) -> tuple[Array, Array, Array]:
+def direct_polynomial(rays: Rays, barrier: Barrier, inward: bool = False) -> tuple[Array, Array, Array]:
     """Return x at the camera and u_c, shape (n,), and the polynomial U / u_c^2 in x of `DirectRays`, shape (5, n).
 
     The barrier is ahead of rays that go out from inside it and, where these are meant, of those that come `inward`.
@@ -247,17 +247,19 @@ def direct_polynomial(
     square = unit * unit
     c2, c3, c4 = radial_polynomial(rays)
     # U = u^4 R, hence U' = 4 u^3 R - u^2 R'.
-    rates = np.stack([
-        square * np.where(ahead, barrier.height, rays.radial**2),
-        np.where(
-            ahead,
-            unit * barrier.slope - 4.0 * square * barrier.height,
-            -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
-        ),
-        c2 + 3.0 * c3 * unit + 6.0 * c4 * square,
-        -unit * (c3 + 4.0 * c4 * unit),
-        c4 * square,
-    ])
+    rates = np.stack(
+        [
+            square * np.where(ahead, barrier.height, rays.radial**2),
+            np.where(
+                ahead,
+                unit * barrier.slope - 4.0 * square * barrier.height,
+                -(2.0 * c2 + 3.0 * c3 * unit + 4.0 * c4 * square),
+            ),
+            c2 + 3.0 * c3 * unit + 6.0 * c4 * square,
+            -unit * (c3 + 4.0 * c4 * unit),
+            c4 * square,
+        ]
+    )
     return 1.0 - 1.0 / (r * unit), unit, rates
 
 
@@ -333,9 +335,11 @@ def inner_turning_polynomial(rays: Rays, barrier: Barrier) -> tuple[Array, Array
 def _rates_at_root(rays: Rays, u_t: Array, slope: Array) -> Array:
     """Return g_0 .. g_3 of G, shape (4, n), at a root of R where R' is `slope`."""
     c2, c3, c4 = radial_polynomial(rays)
-    return np.stack([
-        slope * u_t,  # R'(r_t) / r_t
-        c2 + u_t * (3.0 * c3 + 6.0 * c4 * u_t),
-        -u_t * (c3 + 4.0 * c4 * u_t),
-        c4 * u_t * u_t,
-    ])
+    return np.stack(
+        [
+            slope * u_t,  # R'(r_t) / r_t
+            c2 + u_t * (3.0 * c3 + 6.0 * c4 * u_t),
+            -u_t * (c3 + 4.0 * c4 * u_t),
+            c4 * u_t * u_t,
+        ]
+    )

@@ -69,9 +69,7 @@ class Observer:
         if not 0.0 <= self.theta <= math.pi:
             raise BlackHoleError(f"The observer's theta is {self.theta:g}; it must lie between 0 and pi.")
         if not 0.0 <= self.beta < 1.0:
-            raise BlackHoleError(
-                f"The observer's speed is {self.beta:g} times the speed of light; it must be below 1."
-            )
+            raise BlackHoleError(f"The observer's speed is {self.beta:g} times the speed of light; it must be below 1.")
         norm = math.sqrt(sum(component * component for component in self.direction))
         if abs(norm - 1.0) > UNIT_TOLERANCE:
             raise BlackHoleError(f"The direction of motion {tuple(self.direction)} is not a unit vector.")

@@ -42,9 +42,7 @@ Mask = NDArray[np.bool_]
 class Painting:
     """A warp map in the making; with a table of the same place it traces only what that leaves open."""
 
-    def __init__(
-        self, parameters: WarpMapParameters, table: SkyTable | None = None, view: View | None = None
-    ) -> None:
+    def __init__(self, parameters: WarpMapParameters, table: SkyTable | None = None, view: View | None = None) -> None:
         """`view`: of these parameters, if there is one already."""
         self._parameters = parameters
         self._table = table

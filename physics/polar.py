@@ -114,9 +114,7 @@ class PolarMotion:
         direction = np.empty((3, len(mino_time)))
         for chosen, largest in self._classes():
             part = self.select(chosen)
-            direction[:, chosen] = part._vectors(
-                *part._path(mino_time[chosen], rotation[chosen], largest, tolerance)
-            )
+            direction[:, chosen] = part._vectors(*part._path(mino_time[chosen], rotation[chosen], largest, tolerance))
         return direction
 
     def exit_lines(self, mino_time: Array, rotation: Array, tolerance: float) -> tuple[Array, Array]:
@@ -244,9 +242,7 @@ class PolarMotion:
         names = ("tangent_theta", "tangent_phi", "base", "pole_speed", "b", "mean", "ellipticity")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
-    def _path(
-        self, mino_time: Array, rotation: Array, largest: float, tolerance: float
-    ) -> tuple[Array, Array, Array]:
+    def _path(self, mino_time: Array, rotation: Array, largest: float, tolerance: float) -> tuple[Array, Array, Array]:
         """Return cosine and sine of the angle D along the path, and the whole turn about the axis, for e up to
         `largest`."""
         a2 = self.spin * self.spin

@@ -130,22 +130,22 @@ class _Paths:
         spin, start = rays.spin, 1.0 / rays.observer.r
         with np.errstate(all="ignore"):  # impossible rays are not asked for
             quartic = radial_polynomial(rays)
-            constants = np.stack([
-                *quartic,
-                rays.radial * (start * start),
-                rays.b,
-                rays.carter + spin * (spin - 2.0 * rays.b),
-                ~barrier.blocks & (rays.radial >= 0.0),
-                -negative_root(rays),
-                np.sqrt(np.maximum(rays.carter + spin * spin, 0.0)),
-            ])
+            constants = np.stack(
+                [
+                    *quartic,
+                    rays.radial * (start * start),
+                    rays.b,
+                    rays.carter + spin * (spin - 2.0 * rays.b),
+                    ~barrier.blocks & (rays.radial >= 0.0),
+                    -negative_root(rays),
+                    np.sqrt(np.maximum(rays.carter + spin * spin, 0.0)),
+                ]
+            )
             return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
 
     def for_times(self, chosen: Index, time: Array) -> _Paths:
         """Return the paths of the chosen rays, for these times."""
-        return _Paths(
-            self.spin, self.start, self.function.select(chosen), self._constants.take(chosen, axis=1), time
-        )
+        return _Paths(self.spin, self.start, self.function.select(chosen), self._constants.take(chosen, axis=1), time)
 
     def lasting(self, time: Array) -> _Paths:
         """Return the same paths for other times."""

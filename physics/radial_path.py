@@ -334,9 +334,7 @@ class _Series:
             near = np.where(self.stretched, path.near, 1.0) / np.abs(self._fold(self.centre)[1])
             self.scale = np.maximum(near, np.finfo(float).tiny)
             low, high = (self._unfold(x) for x in (path.start, path.end))
-            low, high = (
-                np.where(self.stretched, np.arcsinh((t - self.centre) / self.scale), t) for t in (low, high)
-            )
+            low, high = (np.where(self.stretched, np.arcsinh((t - self.centre) / self.scale), t) for t in (low, high))
             self.half, self.middle = 0.5 * (high - low), 0.5 * (high + low)
             x, step = self.place(points[:, None])
             speed = path.speed(x)

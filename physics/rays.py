@@ -92,11 +92,13 @@ def camera_triad(observer: Observer) -> Array:
     b_r, b_theta, b_phi = observer.direction
     kappa = math.hypot(b_r, b_phi)
     x_r, x_phi = (1.0, 0.0) if kappa == 0.0 else (b_phi / kappa, -b_r / kappa)
-    return np.array([
-        [x_r, 0.0, x_phi],
-        [b_r, b_theta, b_phi],
-        [-x_phi * b_theta, x_phi * b_r - x_r * b_phi, x_r * b_theta],
-    ])
+    return np.array(
+        [
+            [x_r, 0.0, x_phi],
+            [b_r, b_theta, b_phi],
+            [-x_phi * b_theta, x_phi * b_r - x_r * b_phi, x_r * b_theta],
+        ]
+    )
 
 
 def rays_from_camera(spin: float, observer: Observer, directions: Array) -> Rays:

@@ -174,9 +174,7 @@ def integrate(system: System, tableau: Tableau, tolerance: float, max_steps: int
     yield Integration(final, reached & np.isfinite(final).all(axis=0))
 
 
-def attempt(
-    system: System, tableau: Tableau, state: Array, slope: Array, step: Array
-) -> tuple[Array, Array]:
+def attempt(system: System, tableau: Tableau, state: Array, slope: Array, step: Array) -> tuple[Array, Array]:
     """Return the state after one step of `step` and its difference to the embedded solution."""
     stages = np.empty((len(tableau.stages), *state.shape))
     stages[0] = slope

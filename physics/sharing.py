@@ -107,11 +107,13 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     if not old.sees_the_same_as(new, allowed):
         return None
     azimuth = new.phi - old.phi
-    about_axis = np.array([
-        [math.cos(azimuth), -math.sin(azimuth), 0.0],
-        [math.sin(azimuth), math.cos(azimuth), 0.0],
-        [0.0, 0.0, 1.0],
-    ])
+    about_axis = np.array(
+        [
+            [math.cos(azimuth), -math.sin(azimuth), 0.0],
+            [math.sin(azimuth), math.cos(azimuth), 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
     rotation = np.array(parameters.hole_to_world) @ about_axis @ np.array(before.hole_to_world).T
     counts = {**earlier.counts, "rays": 0, "shared": earlier.counts["rays"] + earlier.counts.get("shared", 0)}
     metadata = {**earlier.metadata, "hash": parameters.hash, "counts": counts, "parameters": parameters.to_metadata()}

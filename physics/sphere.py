@@ -51,8 +51,10 @@ def spherical_triad(theta: float, phi: float) -> Array:
     """Return r-hat, theta-hat and phi-hat at a place as rows of Cartesian components, shape (3, 3)."""
     sin_theta, cos_theta = math.sin(theta), math.cos(theta)
     sin_phi, cos_phi = math.sin(phi), math.cos(phi)
-    return np.array([
-        [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta],
-        [cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta],
-        [-sin_phi, cos_phi, 0.0],
-    ])
+    return np.array(
+        [
+            [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta],
+            [cos_theta * cos_phi, cos_theta * sin_phi, -sin_theta],
+            [-sin_phi, cos_phi, 0.0],
+        ]
+    )

@@ -17,11 +17,13 @@ LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 """Shares of red, green and blue in the luminance (ITU-R BT.709)."""
 
 # CIE XYZ to linear Rec. 709 with D65 white (IEC 61966-2-1).
-_XYZ_TO_REC709 = np.array([
-    [3.2406, -1.5372, -0.4986],
-    [-0.9689, 1.8758, 0.0415],
-    [0.0557, -0.2040, 1.0570],
-])
+_XYZ_TO_REC709 = np.array(
+    [
+        [3.2406, -1.5372, -0.4986],
+        [-0.9689, 1.8758, 0.0415],
+        [0.0557, -0.2040, 1.0570],
+    ]
+)
 
 _WAVELENGTHS = np.arange(380.0, 781.0, 5.0)  # nm
 
@@ -40,11 +42,7 @@ def _matching_functions() -> Array:
     Source: the multi-lobe fits of Wyman, Sloan & Shirley 2013, "Simple Analytic Approximations to the CIE XYZ
     Color Matching Functions", Journal of Computer Graphics Techniques 2 (2), 1, Listing 1.
     """
-    x = (
-        _lobe(0.362, 442.0, 0.0624, 0.0374)
-        + _lobe(1.056, 599.8, 0.0264, 0.0323)
-        + _lobe(-0.065, 501.1, 0.0490, 0.0382)
-    )
+    x = _lobe(0.362, 442.0, 0.0624, 0.0374) + _lobe(1.056, 599.8, 0.0264, 0.0323) + _lobe(-0.065, 501.1, 0.0490, 0.0382)
     y = _lobe(0.821, 568.8, 0.0213, 0.0247) + _lobe(0.286, 530.9, 0.0613, 0.0322)
     z = _lobe(1.217, 437.0, 0.0845, 0.0278) + _lobe(0.681, 459.0, 0.0385, 0.0725)
     return np.stack([x, y, z], axis=-1)

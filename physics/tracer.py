@@ -109,9 +109,7 @@ def stepping(tableau: Tableau, systems: Systems) -> Tracer:
     return trace
 
 
-def _without_steps(
-    rays: Rays, barrier: Barrier, tolerance: float, max_steps: int
-) -> tuple[Array, NDArray[np.bool_]]:
+def _without_steps(rays: Rays, barrier: Barrier, tolerance: float, max_steps: int) -> tuple[Array, NDArray[np.bool_]]:
     """Trace by quadrature and closed forms; the few rays beyond their reach by Cash-Karp steps."""
     direction, resolved = sky_directions(rays, barrier, tolerance)
     rest = np.flatnonzero(~resolved)

@@ -205,9 +205,7 @@ def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
     """
     a = check_spin(spin)
     if a == 0.0:
-        raise BlackHoleError(
-            "Eq. 9 divides by the spin: without spin every trapped orbit has r = 3 and b^2 + q = 27."
-        )
+        raise BlackHoleError("Eq. 9 divides by the spin: without spin every trapped orbit has r = 3 and b^2 + q = 27.")
     r = np.asarray(radius, dtype=np.float64)
     b0 = -(r**3 - 3.0 * r**2 + a * a * r + a * a) / (a * (r - 1.0))
     q0 = -(r**3) * (r**3 - 6.0 * r**2 + 9.0 * r - 4.0 * a * a) / (a * a * (r - 1.0) ** 2)

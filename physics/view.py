@@ -107,9 +107,7 @@ class View:
         They go on smoothly beyond the rays' ends, see `crossings.Crossings`; for `wanted` see `disk_crossings`.
         """
         looking = self._camera.directions(x * self._per_pixel, y * self._per_pixel) @ self._camera_to_motion
-        return disk_crossings(
-            self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted
-        )
+        return disk_crossings(self._spin, self._observer, looking, count, tolerance, method, beyond=True, wanted=wanted)
 
     def places_in_plane(self, radii: Array, azimuths: Array) -> tuple[Array, Array]:
         """Return map pixel coordinates where places in the equatorial plane would be seen in flat space, shape (n,)."""
@@ -145,5 +143,3 @@ class View:
         seen /= (1.0 + beta * along)[:, None]
         x, y = self._camera.pixels(seen @ self._camera_to_triad.T)
         return x / self._per_pixel, y / self._per_pixel
-
-

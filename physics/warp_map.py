@@ -48,9 +48,7 @@ class WarpMap:
         return counts
 
 
-def bake(
-    parameters: WarpMapParameters, *, progress: Progress | None = None, cancel: Cancel | None = None
-) -> WarpMap:
+def bake(parameters: WarpMapParameters, *, progress: Progress | None = None, cancel: Cancel | None = None) -> WarpMap:
     """Trace a warp map.
 
     Parameters

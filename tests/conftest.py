@@ -67,13 +67,9 @@ def addon(extension_zip: Path) -> Iterator[ModuleType]:
     """The extension as a user has it, installed from its zip and enabled: bl_ext.user_default.<id>."""
     import bpy
 
-    addon_utils = importlib.import_module(
-        "addon_utils"
-    )  # Blender's own; bpy must be imported before
+    addon_utils = importlib.import_module("addon_utils")  # Blender's own; bpy must be imported before
     name = "bl_ext.user_default.umbra_black_hole"
-    bpy.ops.extensions.package_install_files(
-        repo="user_default", filepath=str(extension_zip), enable_on_install=True
-    )
+    bpy.ops.extensions.package_install_files(repo="user_default", filepath=str(extension_zip), enable_on_install=True)
     assert name in bpy.context.preferences.addons, f"{name} was installed but could not be enabled"
     yield importlib.import_module(name)
     # Handlers that are still registered when the process ends make Blender 4.5 hang.

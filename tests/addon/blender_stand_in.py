@@ -20,9 +20,10 @@ def run(arguments: list[str]) -> int:
     commands = {}
     bpy.utils.register_cli_command = commands.setdefault
     bpy.utils.unregister_cli_command = lambda _handle: None
-    if "--factory-startup" not in arguments and (
-        Path(bpy.utils.user_resource("EXTENSIONS")) / "user_default" / "umbra_black_hole"
-    ).is_dir():
+    if (
+        "--factory-startup" not in arguments
+        and (Path(bpy.utils.user_resource("EXTENSIONS")) / "user_default" / "umbra_black_hole").is_dir()
+    ):
         importlib.import_module("addon_utils").enable(EXTENSION, default_set=True)
     python_status = 0
     rest = list(arguments)

@@ -111,9 +111,7 @@ def test_failures(
     assert "Traceback" not in err
 
 
-def test_failures_in_json(
-    scene: bpy.types.Scene, run: Callable[[str], int], capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_failures_in_json(scene: bpy.types.Scene, run: Callable[[str], int], capfd: pytest.CaptureFixture[str]) -> None:
     assert run("bake --json") == 1
     (end,) = events(capfd.readouterr().out)
     assert end["status"] == 1

@@ -42,9 +42,7 @@ os._exit(0)
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has one scope of names for all libraries")
 def test_maps_are_baked_read_and_rendered_where_blenders_libraries_are_global(addon: object, tmp_path: Path) -> None:
     script = SCRIPT.format(tools=str(Path(__file__).parent), folder=str(tmp_path))
-    result = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=False
-    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "all done" in result.stdout
     assert result.stderr == ""

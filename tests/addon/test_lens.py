@@ -232,9 +232,7 @@ def show_directions(scene: bpy.types.Scene) -> None:
 @pytest.mark.parametrize("spin", [0.0, 0.9, 0.9999])
 @pytest.mark.parametrize("motion", ["FIDO", "CIRCULAR", "FREE_FALL", "STATIC"])
 @pytest.mark.parametrize("rays", ["IN_SHADER", "EXIT_MAP"])
-def test_directions_of_the_shader_are_those_of_the_map(
-    scene, tmp_path, exr, addon_module, spin, motion, rays
-) -> None:
+def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, addon_module, spin, motion, rays) -> None:
     """To 2e-4 radians two pixels and more away from the edge.
 
     Cycles' narrowest filter places a sample within half a hundredth of a pixel of its centre: so much of the difference

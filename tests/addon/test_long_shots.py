@@ -128,9 +128,7 @@ def test_a_bake_that_is_killed_again_and_again(
     assert not hidden(folder)
 
 
-def test_three_processes_share_a_folder(
-    blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
-) -> None:
+def test_three_processes_share_a_folder(blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]) -> None:
     package = addon_module("_physics").physics
     processes = [start_python(bake(blend, arguments=("bake", "--json", "--frames", "1-40"))) for _ in range(3)]
     outputs = [process.communicate(timeout=300) for process in processes]

@@ -74,9 +74,7 @@ def looking(scene: bpy.types.Scene, physics: ModuleType) -> np.ndarray:
     """World directions of the pixels' centres, row by row from the top."""
     width, height = SIZE
     data = scene.camera.data
-    camera = physics.physics.PerspectiveCamera(
-        width, height, focal_length=data.lens, sensor_width=data.sensor_width
-    )
+    camera = physics.physics.PerspectiveCamera(width, height, focal_length=data.lens, sensor_width=data.sensor_width)
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     axes = np.array(scene.camera.matrix_world, dtype=np.float64)[:3, :3]
     return camera.directions(x.ravel(), y.ravel()) @ axes.T

@@ -44,9 +44,7 @@ def manifest(published: zipfile.ZipFile) -> dict:
 @pytest.fixture(scope="session")
 def sources(published: zipfile.ZipFile) -> dict[str, ast.Module]:
     """The syntax tree of each Python file in the zip."""
-    return {
-        name: ast.parse(published.read(name), name) for name in published.namelist() if name.endswith(".py")
-    }
+    return {name: ast.parse(published.read(name), name) for name in published.namelist() if name.endswith(".py")}
 
 
 def imported_modules(tree: ast.Module) -> set[str]:
@@ -66,9 +64,7 @@ def shipped_files() -> set[str]:
     for folder, prefix in ((ROOT / "blender_addon", Path()), (ROOT / "physics", Path("physics"))):
         for path in folder.rglob("*"):
             inside = path.relative_to(folder)
-            if path.is_file() and not any(
-                part == "__pycache__" or part.startswith(".") for part in inside.parts
-            ):
+            if path.is_file() and not any(part == "__pycache__" or part.startswith(".") for part in inside.parts):
                 found.add((prefix / inside).as_posix())
     return found
 
@@ -121,11 +117,7 @@ def test_every_platform_has_its_wheels(published: zipfile.ZipFile, manifest: dic
 def test_leaves_the_module_search_path_alone(sources: dict[str, ast.Module]) -> None:
     for name, tree in sources.items():
         for node in ast.walk(tree):
-            if (
-                isinstance(node, ast.Attribute)
-                and isinstance(node.value, ast.Name)
-                and node.value.id == "sys"
-            ):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "sys":
                 assert node.attr not in {"path", "meta_path", "path_hooks"}, f"{name} line {node.lineno}"
             if isinstance(node, ast.ImportFrom) and node.module == "sys":
                 assert not {"path", "meta_path", "path_hooks"} & {alias.name for alias in node.names}, name
@@ -157,16 +149,12 @@ def test_splits_by_platform(build_extension: ModuleType, tmp_path: Path) -> None
         assert all(f"-{tag}" in wheel for wheel in wheels)
 
 
-def test_a_missing_wheel_is_named(
-    build_extension: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_wheel_is_named(build_extension: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a network, pip's failure becomes a sentence that names the wheel and where to put it."""
     monkeypatch.setattr(build_extension, "WHEEL_CACHE", tmp_path)
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.delenv("PIP_FIND_LINKS", raising=False)
-    with pytest.raises(
-        SystemExit, match=r"openexr-.*-cp313-cp313-win_amd64\.whl is missing.*Check the network"
-    ):
+    with pytest.raises(SystemExit, match=r"openexr-.*-cp313-cp313-win_amd64\.whl is missing.*Check the network"):
         build_extension.wheel("cp313", "windows-x64")
 
 
@@ -202,14 +190,9 @@ def traces() -> dict[str, list[str]]:
         "classes": sorted(name for name in dir(bpy.types) if "umbra" in name.lower()),
         "operators": sorted(dir(bpy.ops.umbra)),
         "properties": sorted(
-            f"{owner}.{name}"
-            for owner in owners
-            for name in dir(getattr(bpy.types, owner))
-            if "umbra" in name
+            f"{owner}.{name}" for owner in owners for name in dir(getattr(bpy.types, owner)) if "umbra" in name
         ),
-        "handlers": sorted(
-            f"{name}:{f.__name__}" for name, calls in handlers.items() for f in calls if ours(f)
-        ),
+        "handlers": sorted(f"{name}:{f.__name__}" for name, calls in handlers.items() for f in calls if ours(f)),
         "menus": sorted(f"{name}:{f.__name__}" for name, calls in drawn.items() for f in calls if ours(f)),
     }
 

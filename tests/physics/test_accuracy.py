@@ -150,9 +150,10 @@ def test_visible_shares_agree_with_counting(baked, tmp_path):
     rows, columns = np.nonzero((baked.visibility > 0.0) & (baked.visibility < 1.0))
     rows, columns = rows[::10], columns[::10]
     inside = (np.arange(32) + 0.5) / 32
-    looking = parameters.camera.directions(
-        columns[:, None, None] + inside, rows[:, None, None] + inside[:, None]
-    ) @ np.array(parameters.camera_to_hole).T
+    looking = (
+        parameters.camera.directions(columns[:, None, None] + inside, rows[:, None, None] + inside[:, None])
+        @ np.array(parameters.camera_to_hole).T
+    )
     observer = parameters.observer()
     r_hat, theta_hat, phi_hat = spherical_triad(observer.theta, observer.phi)
     theta_rd = np.arccos(np.clip(-(looking @ theta_hat), -1.0, 1.0))

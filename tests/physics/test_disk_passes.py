@@ -64,9 +64,7 @@ LARGE_SHOTS = {
     "fast, narrow lens": shot(
         320, 180, spin=0.9, radius=60.0, fov=12.0, motion="velocity", velocity=(-0.5, 0.04, 0.03), disk=DISK
     ),
-    "a thin ring": shot(
-        320, 180, spin=0.3, radius=25.0, fov=40.0, disk=Disk(inner_radius=10.0, outer_radius=10.3)
-    ),
+    "a thin ring": shot(320, 180, spin=0.3, radius=25.0, fov=40.0, disk=Disk(inner_radius=10.0, outer_radius=10.3)),
     "far larger than the picture": shot(320, 180, spin=0.9, radius=9.0, disk=Disk(outer_radius=2000.0)),
 }
 # Places inside a pixel whose mean is the coverage, for the check.
@@ -273,7 +271,10 @@ def test_frames_of_an_orbit_share_passes():
 def test_negative_energies_have_their_redshift():
     """In the ergosphere the disk is seen along rays of negative energy too, with g > 0."""
     parameters = shot(
-        camera=PanoramaCamera(64, 32), camera_position=(1.3, 0.0, 0.05), motion="fido", spin=0.9999,
+        camera=PanoramaCamera(64, 32),
+        camera_position=(1.3, 0.0, 0.05),
+        motion="fido",
+        spin=0.9999,
         disk=Disk(crossings=1, inner_radius=1.02),
     )
     view = View(parameters)
@@ -306,7 +307,12 @@ def test_light_at_the_rim_of_falling_matter_can_be(spin, radius, inclination, in
 def test_a_disk_of_any_size_has_its_second_image(outer):
     """What is off a large disk is no less than what is off a small one."""
     parameters = shot(
-        960, 540, spin=0.6, radius=300.0, inclination=74.5, camera=PanoramaCamera(960, 540),
+        960,
+        540,
+        spin=0.6,
+        radius=300.0,
+        inclination=74.5,
+        camera=PanoramaCamera(960, 540),
         disk=Disk(crossings=2, outer_radius=outer),
     )
     adaptive = bake(parameters).disk_passes[1]

@@ -138,9 +138,7 @@ def test_usable_pixels_interpolate_as_well_as_they_claim():
     # fine pixel (2 j + 1, 2 i + 1) has its centre a quarter of the way from coarse centre (j, i) to the next
     weights = ((0.75, 0.75, 0, 0), (0.75, 0.25, 0, 1), (0.25, 0.75, 1, 0), (0.25, 0.25, 1, 1))
     height, width = cells.shape
-    mean = sum(
-        wy * wx * exits.direction[j : j + height, i : i + width].astype(float) for wy, wx, j, i in weights
-    )
+    mean = sum(wy * wx * exits.direction[j : j + height, i : i + width].astype(float) for wy, wx, j, i in weights)
     truth = finer.direction[1 : 2 * height : 2, 1 : 2 * width : 2]
     wrong = np.linalg.norm(mean - truth, axis=-1)[cells]
     assert wrong.max() < 3.0 * BILINEAR_TOLERANCE

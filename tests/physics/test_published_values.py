@@ -77,9 +77,7 @@ def test_einstein_rings(radius, order, _b, psi):
     observer = Observer.static(0.0, float(radius), 1.2, 0.5)
     turn = np.linspace(0.0, 2.0 * math.pi, 7)
     looking = np.stack([-np.cos(psi) * np.ones_like(turn), np.sin(psi) * np.cos(turn), np.sin(psi) * np.sin(turn)])
-    result = trace_rays(
-        0.0, observer, np.arccos(looking[2]), np.arctan2(looking[1], looking[0]), tolerance=1e-11
-    )
+    result = trace_rays(0.0, observer, np.arccos(looking[2]), np.arctan2(looking[1], looking[0]), tolerance=1e-11)
     behind = unit_vectors(np.array(math.pi - 1.2), np.array(0.5 + math.pi))
     # Each turn multiplies errors by e^(2 pi): the published psi has 15 digits, a rounding of 1e-16 becomes
     # 1e-16 r e^(2 pi n).
@@ -115,9 +113,7 @@ def test_points_of_the_critical_curve(spin, _radius, alpha, beta):
     assert q == pytest.approx(beta**2, abs=1e-11, rel=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("spin", "radius", "beta", "one_plus_z", "prograde", "retrograde"), PUBLISHED["camera_edges"]
-)
+@pytest.mark.parametrize(("spin", "radius", "beta", "one_plus_z", "prograde", "retrograde"), PUBLISHED["camera_edges"])
 def test_shadow_edges_in_a_moving_cameras_sky(spin, radius, beta, one_plus_z, prograde, retrograde):
     observer = Observer(float(radius), EQUATOR, 0.0, float(beta))
     middle = 0.5 * (prograde + retrograde)
@@ -146,9 +142,7 @@ def test_redshift_on_a_circular_orbit():
     observer = Observer.circular_orbit(spin, radius)
     b = trapped_impact_parameters(spin)[1]
     root = radius**1.5
-    expected = math.sqrt(1.0 - 3.0 / radius + 2.0 * spin / root) / (
-        (1.0 + spin / root) * (1.0 - b / (spin + root))
-    )
+    expected = math.sqrt(1.0 - 3.0 / radius + 2.0 * spin / root) / ((1.0 + spin / root) * (1.0 - b / (spin + root)))
     # The edge itself is shadow; a step of 1e-10 rad outside changes 1 + z by as little.
     seen = trace_rays(spin, observer, EQUATOR, 2.99902198835921 + 1e-10).one_plus_z
     assert seen == pytest.approx(expected, rel=1e-8)

@@ -34,9 +34,7 @@ CAMERAS = {
 
 def tables_of(parameters):
     inner, outer = parameters.disk.radii(parameters.spin)
-    needs = Needs(
-        inner, outer, 2e-5, parameters.pixel_angle, PIXEL_ERROR, PLACE_ERROR * parameters.interpolation
-    )
+    needs = Needs(inner, outer, 2e-5, parameters.pixel_angle, PIXEL_ERROR, PLACE_ERROR * parameters.interpolation)
     return ring_tables(parameters.spin, parameters.observer(), (1, 2), needs, View(parameters).edge_about)[0]
 
 

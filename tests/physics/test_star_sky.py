@@ -73,9 +73,7 @@ def test_magnitude_limit_leaves_out_the_faint_stars() -> None:
     bright = load_stars(2.0)
     assert bright.magnitude.max() <= 2.0
     expected = bright.flux.sum() * ZERO_MAGNITUDE
-    assert light(star_sky(64, magnitude_limit=2.0, galactic_glow=False)).sum() == pytest.approx(
-        expected, rel=1e-6
-    )
+    assert light(star_sky(64, magnitude_limit=2.0, galactic_glow=False)).sum() == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -101,9 +99,7 @@ def test_known_stars_are_where_they_belong(name: str, stars_only: np.ndarray, di
     ("ra", "dec"),
     [(0, 0), (180, 10), (77, -45.3), (200, 85), (300, -89.5), (10, 89.97), (123, 90), (0, -90)],
 )
-def test_a_star_is_round_and_keeps_its_light_everywhere(
-    ra: float, dec: float, directions: np.ndarray
-) -> None:
+def test_a_star_is_round_and_keeps_its_light_everywhere(ra: float, dec: float, directions: np.ndarray) -> None:
     picture = draw_stars(one_star(ra, dec), HEIGHT, star_width=2.0)
     share = light(picture)
     assert share.sum() == pytest.approx(1.0, rel=1e-12)
@@ -201,9 +197,7 @@ def test_no_light_is_counted_twice() -> None:
 
 def test_the_sky_is_the_stars_and_the_glow() -> None:
     picture, alone = star_sky(64), star_sky(64, galactic_glow=False)
-    glow = (
-        unresolved_glow(float(load_stars().flux.sum()))(texel_directions(np.arange(64), 64)) * ZERO_MAGNITUDE
-    )
+    glow = unresolved_glow(float(load_stars().flux.sum()))(texel_directions(np.arange(64), 64)) * ZERO_MAGNITUDE
     np.testing.assert_allclose((picture - alone) @ LUMINANCE_WEIGHTS, glow, rtol=2e-3, atol=1e-6)
 
 

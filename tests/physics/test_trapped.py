@@ -155,8 +155,6 @@ def test_the_edge_is_found_wherever_it_is_looked_for_first(radius, off, reach, e
     turn = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
     expected = math.asin(math.sqrt(27.0 * (1.0 - 2.0 / radius)) / radius)
     about = np.full(len(turn), expected + off)
-    found = edge_angles(
-        0.0, Observer.fido(radius, 1.1, 0.3), np.cos(turn), np.sin(turn), error, about=(about, reach)
-    )
+    found = edge_angles(0.0, Observer.fido(radius, 1.1, 0.3), np.cos(turn), np.sin(turn), error, about=(about, reach))
     assert np.all(found >= expected - 1e-14 * radius)
     assert np.all(found <= expected + error + 1e-14 * radius)

@@ -121,8 +121,9 @@ def test_near_edge_takes_pixels_that_the_edge_only_bulges_into():
 def test_near_the_seam_of_a_panorama():
     """A hole behind the camera is cut by the picture's left and right sides: both halves are anti-aliased alike."""
     position = (12.0, 0.0, 0.0)
-    parameters = shot(camera=PanoramaCamera(64, 32), camera_position=position, camera_to_hole=AWAY, motion="fido",
-                      spin=0.0)
+    parameters = shot(
+        camera=PanoramaCamera(64, 32), camera_position=position, camera_to_hole=AWAY, motion="fido", spin=0.0
+    )
     warp_map = bake(parameters)
     assert (warp_map.visibility[:, 0] < 1.0).any()
     # Cells are halved along one diagonal: mirror images have other chords, 1/(8 n^2 R) = 2e-3 with R about 5 pixels.

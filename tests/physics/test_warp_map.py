@@ -68,8 +68,12 @@ def test_moving_the_camera_about_the_axis_turns_the_sky():
     position = (8.0, 0.0, 2.0)
     turn = about(2, 1.1)
     one = bake(shot(camera_position=position, camera_to_hole=looking_at_hole(position)))
-    other = bake(shot(camera_position=(turn @ position).tolist(),
-                      camera_to_hole=(turn @ np.array(looking_at_hole(position))).tolist()))
+    other = bake(
+        shot(
+            camera_position=(turn @ position).tolist(),
+            camera_to_hole=(turn @ np.array(looking_at_hole(position))).tolist(),
+        )
+    )
     seen = one.visibility == 1.0
     distance = angle_between(
         unit_vectors(one.theta.astype(float), one.phi.astype(float)) @ turn.T,
