@@ -21,9 +21,9 @@ import numpy as np
 from build_extension import build, current_platform
 
 from physics import read_warp_map
-from physics.exr import read_exr, write_exr
-from physics.reference_render import render
-from physics.star_sky import star_sky
+from physics.images.exr import read_exr, write_exr
+from physics.light.star_sky import star_sky
+from physics.reference.reference_render import render
 
 SCENE_SCRIPT = Path(__file__).with_name("end_to_end_scene.py")
 SIZE = (160, 90)

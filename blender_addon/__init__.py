@@ -6,19 +6,11 @@ from collections.abc import Callable
 
 import bpy
 
-from . import (
-    accuracy_check,
-    cache_panel,
-    command,
-    disk_panel,
-    farm_copy,
-    farm_templates,
-    handlers,
-    operators,
-    panels,
-    preview_panel,
-    properties,
-)
+from .command import command_line
+from .farm import farm_copy, farm_templates
+from .render import handlers
+from .settings import properties
+from .ui import accuracy_check, cache_panel, disk_panel, operators, panels, preview_panel
 
 _CLASSES = (
     *properties.CLASSES,
@@ -45,7 +37,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, preview_panel, handlers, command):
+        for module in (properties, operators, preview_panel, handlers, command_line):
             module.register()
             _undo.append(module.unregister)
     except BaseException:

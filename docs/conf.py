@@ -52,7 +52,7 @@ OPTIONAL = ("live_preview", "world", "long_shots", "farms", "accuracy")
 MIRRORS = {
     "demo_scenes": ("blend_files/README.md", "# Demo scenes"),
     "developers": ("README.md", "## For developers"),
-    "data": ("physics/data/README.md", "# Data"),
+    "data": ("physics/light/data/README.md", "# Data"),
     "changelog": ("CHANGELOG.md", "# Changelog"),
 }
 _LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
@@ -102,7 +102,7 @@ def _public_name(
 ) -> nodes.Element | None:
     """Find `physics.observer.Observer`, as type hints say, where it is documented: `physics.Observer`."""
     target = node.get("reftarget", "")
-    found = re.fullmatch(r"physics\.\w+\.(\w+)", target)
+    found = re.fullmatch(r"physics\.[\w.]+\.(\w+)", target)
     if node.get("refdomain") != "py" or found is None or found[1] not in physics.__all__:
         return None
     return environment.get_domain("py").resolve_xref(

@@ -15,11 +15,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from physics import Observer, trace_rays
-from physics.disk_flux import relative_flux
-from physics.metric import ergosphere_radius, horizon_radius, isco_radius, metric_functions, photon_orbit_radius
-from physics.mino import radial_polynomial
-from physics.rays import camera_directions, rays_from_camera
-from physics.trapped import trapped_carter_constant, trapped_impact_parameters
+from physics.geodesics.mino import radial_polynomial
+from physics.kerr.critical_curve import trapped_carter_constant, trapped_impact_parameters
+from physics.kerr.metric import ergosphere_radius, horizon_radius, isco_radius, metric_functions, photon_orbit_radius
+from physics.kerr.rays import camera_directions, rays_from_camera
+from physics.light.disk_flux import relative_flux
 
 SPINS = (0.0, 0.5, 0.9, 0.998)
 FAR = 1e4

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rays of light around a spinning (Kerr) black hole, and the warp maps made of them."""
 
-from .background import Background
-from .cameras import PanoramaCamera, PerspectiveCamera
-from .disk import Disk
-from .disk_pass import DiskPass
-from .disk_pass_file import read_disk_pass, write_disk_pass
-from .disk_tracer import DEFAULT_CROSSINGS, MOST_CROSSINGS, DiskResult, trace_disk
-from .errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
-from .observer import Observer
-from .sharing import MapBaker, turned_map
-from .shot import (
+from .disk_passes.disk_pass import DiskPass
+from .files.disk_pass_file import read_disk_pass, write_disk_pass
+from .files.warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
+from .geodesics.disk_tracer import DEFAULT_CROSSINGS, MOST_CROSSINGS, DiskResult, trace_disk
+from .geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS, Fate, TraceResult, trace_rays
+from .kerr.observer import Observer
+from .maps.sharing import MapBaker, turned_map
+from .maps.warp_map import WarpMap, bake, bake_steps
+from .numerics.background import Background
+from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
+from .shot.cameras import PanoramaCamera, PerspectiveCamera
+from .shot.disk import Disk
+from .shot.map_parameters import (
     DEFAULT_INTERPOLATION,
     IDENTITY,
     MOTIONS,
@@ -19,9 +22,6 @@ from .shot import (
     looking_at_hole,
     unstable_orbit_warning,
 )
-from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS, Fate, TraceResult, trace_rays
-from .warp_map import WarpMap, bake, bake_steps
-from .warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
 
 __all__ = [
     "DEFAULT_CROSSINGS",

@@ -12,13 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from . import accuracy_command, disk_command, verify_command
-from .cameras import Camera, PanoramaCamera, PerspectiveCamera
-from .errors import BlackHoleError
-from .exr import read_exr, write_exr
-from .png import write_png
-from .reference_render import render
-from .shot import (
+from .cli import accuracy_command, disk_command, verify_command
+from .files.warp_map_file import read_warp_map, write_warp_map
+from .geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
+from .images.exr import read_exr, write_exr
+from .images.png import write_png
+from .maps.warp_map import bake
+from .numerics.errors import BlackHoleError
+from .reference.reference_render import render
+from .shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .shot.map_parameters import (
     DEFAULT_INTERPOLATION,
     MOTIONS,
     SUPERSAMPLING,
@@ -26,9 +29,6 @@ from .shot import (
     looking_at_hole,
     unstable_orbit_warning,
 )
-from .tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
-from .warp_map import bake
-from .warp_map_file import read_warp_map, write_warp_map
 
 # Motions as they are spelled on a command line; "velocity" has no short form there.
 ORBITS = {motion.replace("_", "-"): motion for motion in MOTIONS if motion != "velocity"}

@@ -78,7 +78,7 @@ def addon(extension_zip: Path) -> Iterator[ModuleType]:
 
 @pytest.fixture(scope="session")
 def addon_module(addon: ModuleType) -> Callable[[str], ModuleType]:
-    """A function that imports a submodule of the installed extension: addon_module("operators")."""
+    """A function that imports a submodule of the installed extension: addon_module("ui.operators")."""
 
     def submodule(name: str) -> ModuleType:
         return importlib.import_module(f"{addon.__name__}.{name}")

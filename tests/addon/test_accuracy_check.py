@@ -12,7 +12,7 @@ import pytest
 from small_scene import add_hole, shrink
 
 import physics
-from physics.accuracy import check_accuracy
+from physics.accuracy_check.accuracy import check_accuracy
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def scene(tmp_path: Path) -> bpy.types.Scene:
 
 def check(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene) -> object:
     assert bpy.ops.umbra.check_accuracy() == {"FINISHED"}
-    return addon_module("accuracy_check").report_of(scene)[1]
+    return addon_module("ui.accuracy_check").report_of(scene)[1]
 
 
 def test_the_report_is_that_of_the_physics(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene) -> None:
@@ -38,7 +38,9 @@ def test_the_report_is_that_of_the_physics(addon_module: Callable[[str], ModuleT
     assert report.worst < 1e-5
     assert report.environment_width == width
     # the panel's lines are these
-    lines = [line.text for sentence in report.sentences() for line in addon_module("status").wrapped(sentence, "DOT")]
+    lines = [
+        line.text for sentence in report.sentences() for line in addon_module("ui.status").wrapped(sentence, "DOT")
+    ]
     assert any("arc seconds" in line for line in lines)
 
 
@@ -83,8 +85,8 @@ def test_without_a_map_it_says_what_to_do(scene: bpy.types.Scene) -> None:
 def test_it_stops_when_asked(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene) -> None:
     """The operator in a window draws a step at a time from this; closing it ends the work."""
     bpy.ops.umbra.bake_frame()
-    steps = addon_module("accuracy_check").check_frame(scene.name)
+    steps = addon_module("ui.accuracy_check").check_frame(scene.name)
     fractions = [next(steps).fraction, next(steps).fraction]
     assert 0.0 <= fractions[0] < fractions[1] < 1.0
     steps.close()
-    assert addon_module("accuracy_check").report_of(scene) is None
+    assert addon_module("ui.accuracy_check").report_of(scene) is None

@@ -56,7 +56,7 @@ def test_a_pan_and_zoom_share_a_table_of_the_sky(
         camera.keyframe_insert("rotation_euler", frame=frame)
         camera.data.lens = lens
         camera.data.keyframe_insert("lens", frame=frame)
-    tables = bake_and_count(addon_module("_physics").physics, monkeypatch)
+    tables = bake_and_count(addon_module("core.physics_api").physics, monkeypatch)
     assert len(maps_in(tmp_path)) == 3
     assert tables[0] is None
     assert tables[1] is not None
@@ -76,12 +76,12 @@ def test_an_orbits_frames_share_one_trace(
     for frame, angle in ((1, 0.0), (3, 1.5)):
         arm.rotation_euler.z = angle
         arm.keyframe_insert("rotation_euler", frame=frame)
-    package = addon_module("_physics").physics
+    package = addon_module("core.physics_api").physics
     tables = bake_and_count(package, monkeypatch)
     assert len(maps_in(tmp_path)) == 3
     assert tables == [None]
 
-    shot = addon_module("shot").read_at(scene, 3)
+    shot = addon_module("scene.frame_setup").read_at(scene, 3)
     baked = package.read_warp_map(tmp_path / "maps" / "Scene_Black_Hole_64x36_0003.exr")
     assert baked.metadata["hash"] == shot.parameters.hash
     expected = package.bake(shot.parameters)
@@ -130,7 +130,7 @@ def test_a_rebaked_map_of_the_same_frame_is_seen(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     hole = add_hole(scene)
-    exr = addon_module("_physics").exr
+    exr = addon_module("core.physics_api").exr
     bpy.ops.umbra.bake_frame()
     first = render(scene, tmp_path / "a.exr", exr)
     hole.umbra.mass_scale *= 1.5
@@ -170,7 +170,7 @@ def test_a_full_disk(
 ) -> None:
     add_hole(scene)
     usage = SimpleNamespace(total=10, used=10, free=1000)
-    monkeypatch.setattr(addon_module("maps").shutil, "disk_usage", lambda _path: usage)
+    monkeypatch.setattr(addon_module("bake.maps").shutil, "disk_usage", lambda _path: usage)
     with pytest.raises(RuntimeError, match=r"disk of the warp map folder .* is full"):
         bpy.ops.umbra.bake_frame()
     assert not maps_in(tmp_path)
@@ -182,7 +182,7 @@ def test_steps_yield_often_and_leave_the_scene_at_its_frame(
     add_hole(scene)
     move_camera(scene)
     scene.frame_set(2)
-    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
     fractions = []
     for progress in steps:
         assert scene.frame_current == 2
@@ -197,7 +197,7 @@ def test_closing_the_generator_cancels_and_keeps_finished_maps(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     add_hole(scene)
-    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
     while next(steps).frame == 1:
         pass
     steps.close()
@@ -206,10 +206,10 @@ def test_closing_the_generator_cancels_and_keeps_finished_maps(
 
 def test_a_scene_that_vanishes_ends_the_bake(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
     add_hole(scene)
-    steps = addon_module("baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
     next(steps)
     scene.name = "Renamed"
-    with pytest.raises(addon_module("errors").SceneError, match='"Scene" is gone'):
+    with pytest.raises(addon_module("core.errors").SceneError, match='"Scene" is gone'):
         list(steps)
 
 
@@ -237,7 +237,7 @@ class Window:
 @pytest.fixture
 def modal(addon_module: Callable[[str], ModuleType]) -> SimpleNamespace:
     """The operator's methods on a stand-in, because Blender makes operators only in windows."""
-    operators = addon_module("operators")
+    operators = addon_module("ui.operators")
     reports: list[tuple[set[str], str]] = []
 
     class Stand(operators.BakeOperator):
@@ -298,7 +298,7 @@ def test_modal_error(scene: bpy.types.Scene, modal: SimpleNamespace) -> None:
 def test_the_panel_tells_the_state(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    status = addon_module("status")
+    status = addon_module("ui.status")
 
     def text() -> str:
         status._counted.clear()

@@ -13,7 +13,7 @@ from test_baking import ESCAPE, TIMER, Window
 
 @pytest.fixture
 def panel(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    module = addon_module("cache_panel")
+    module = addon_module("ui.cache_panel")
     module._told.clear()
     return module
 

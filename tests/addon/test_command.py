@@ -13,7 +13,7 @@ from small_scene import add_hole
 
 @pytest.fixture
 def run(addon_module: Callable[[str], ModuleType]) -> Callable[[str], int]:
-    command = addon_module("command")
+    command = addon_module("command.command_line")
     return lambda line: command.run(line.split())
 
 

@@ -12,12 +12,12 @@ from small_scene import add_hole, compositor, environment_image, links_of, shrin
 
 @pytest.fixture
 def tree_module(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("compositor_tree")
+    return addon_module("outputs.shared.compositor_tree")
 
 
 @pytest.fixture
 def environment(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("environment")
+    return addon_module("scene.environment")
 
 
 @pytest.fixture
@@ -183,11 +183,11 @@ def test_an_output_that_does_not_use_the_render_is_left_alone(
     tree.links.new(colour.outputs[0], output.inputs[0])
     before, names = links_of(tree), {node.name for node in tree.nodes}
     use_sky(scene)
-    notes = addon_module("compositing").set_up(scene)
+    notes = addon_module("outputs.compositor.compositing").set_up(scene)
     assert any("does not use the render" in note for note in notes)
     assert origin(output.inputs[0])[0] == colour
     assert not tree_module.is_in_use(scene)
-    addon_module("compositing").remove(scene)
+    addon_module("outputs.compositor.compositing").remove(scene)
     assert links_of(tree) == before
     assert {node.name for node in tree.nodes} == names
 
@@ -248,7 +248,7 @@ def test_a_texture_mapping_node_is_the_inverse_rotation(scene: bpy.types.Scene, 
 def test_worlds_that_cannot_be_taken_over_say_why(
     scene: bpy.types.Scene, environment: ModuleType, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    scene_error = addon_module("errors").SceneError
+    scene_error = addon_module("core.errors").SceneError
 
     def refused(pattern: str) -> None:
         with pytest.raises(scene_error, match=pattern):
@@ -287,7 +287,7 @@ def test_the_default_world_brings_the_real_stars(
 ) -> None:
     add_hole(scene, sky=False)
     exposure = tree_module.find_setup(scene).group.inputs["Exposure"]
-    assert exposure.default_value == addon_module("environment").STAR_SKY_EXPOSURE
+    assert exposure.default_value == addon_module("scene.environment").STAR_SKY_EXPOSURE
     exposure.default_value = 1.0  # the artist's own stays
     assert bpy.ops.umbra.use_star_sky() == {"FINISHED"}
     assert exposure.default_value == 1.0
@@ -309,5 +309,5 @@ def test_a_sky_of_the_artists_own_nodes_stays(
     bpy.ops.umbra.setup_compositor()
     assert origin(setup.group.inputs["Environment"])[0] == colour
     scene.umbra.environment_image = None
-    addon_module("sync").sync_sky(scene)  # nothing is missing
-    assert addon_module("status").sky_problem(scene) is None
+    addon_module("outputs.compositor.compositor_sync").sync_sky(scene)  # nothing is missing
+    assert addon_module("ui.status").sky_problem(scene) is None

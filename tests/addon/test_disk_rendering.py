@@ -22,7 +22,7 @@ TYPICAL = 2e-5
 
 @pytest.fixture
 def modules(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics")
+    return addon_module("core.physics_api")
 
 
 @pytest.fixture
@@ -51,17 +51,17 @@ def expected_picture(
     frame: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The picture by numpy in float64, and the light of the disk in it."""
-    modules, maps, shot = addon_module("_physics"), addon_module("maps"), addon_module("shot")
+    modules, maps, shot = addon_module("core.physics_api"), addon_module("bake.maps"), addon_module("scene.frame_setup")
     settings = scene.umbra.active_hole.umbra.disk
     frame = scene.frame_current if frame is None else frame
     parameters = shot.read_at(scene, frame).parameters
     path = maps.map_path(scene, scene.umbra.active_hole.name, parameters.map_size, frame)
     physics = modules.physics
     passes = [physics.read_disk_pass(each) for each in maps.pass_paths(path, parameters)]
-    look = addon_module("disk_properties").look_of(settings)
-    texture = addon_module("disk_images").streaks() if texture is None else texture
+    look = addon_module("settings.disk_properties").look_of(settings)
+    texture = addon_module("nodes.disk_images").streaks() if texture is None else texture
     time = frame * settings.turning_speed * scene.render.fps_base / scene.render.fps
-    period = addon_module("disk_animation").pattern_period(scene, scene.umbra.active_hole)
+    period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
     light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
     sky = modules.reference_render.render(physics.read_warp_map(path), environment_pixels(), output_size=size).image
     picture = modules.disk_render.over_sky(sky, light, through)
@@ -107,7 +107,7 @@ def test_every_preset_is_what_numpy_makes(
     assert bpy.ops.umbra.disk_preset(preset=preset) == {"FINISHED"}
     name = preset.lower().replace("_", " ")
     for field, value in vars(modules.disk_look.PRESETS[name]).items():
-        found = getattr(addon_module("disk_properties").look_of(hole.umbra.disk), field)
+        found = getattr(addon_module("settings.disk_properties").look_of(hole.umbra.disk), field)
         assert found == (value if isinstance(value, str) else pytest.approx(value, rel=1e-6)), field
     scene.frame_set(40)
     picture = render(scene, tmp_path / "picture.exr", modules.exr)
@@ -256,11 +256,11 @@ def test_one_period_holds_for_all_frames(
     for frame, spin in ((1, 0.2), (5, 0.9)):
         hole.umbra.spin = spin
         hole.keyframe_insert("umbra.spin", frame=frame)
-    texture, period_of = modules.disk_texture, addon_module("disk_animation").pattern_period
-    disk = addon_module("disk_properties").disk_of(hole.umbra.disk)
+    texture, period_of = modules.disk_texture, addon_module("scene.disk_animation").pattern_period
+    disk = addon_module("settings.disk_properties").disk_of(hole.umbra.disk)
     for frame in (1, 4):
         scene.frame_set(frame)
-        spins = [addon_module("disk_animation").value_at(hole, "umbra.spin", each) for each in range(1, 6)]
+        spins = [addon_module("scene.disk_animation").value_at(hole, "umbra.spin", each) for each in range(1, 6)]
         expected = min(texture.pattern_period(spin, *disk.radii(spin)) for spin in spins)
         assert period_of(scene, hole) == pytest.approx(expected)
 
@@ -280,10 +280,10 @@ def test_a_spin_that_cannot_be_followed_is_refused(
         animation.nla_tracks.new().strips.new("Spin", 1, animation.action)
         animation.action = None
     scene.frame_set(1)
-    addon_module("disk_sync").refresh(scene)
-    parameters = addon_module("shot").read_at(scene, 3).parameters
-    with pytest.raises(addon_module("errors").SceneError, match=r"driver|cannot follow"):
-        addon_module("disk_sync").check_shot(scene, parameters)
+    addon_module("outputs.shared.disk_sync").refresh(scene)
+    parameters = addon_module("scene.frame_setup").read_at(scene, 3).parameters
+    with pytest.raises(addon_module("core.errors").SceneError, match=r"driver|cannot follow"):
+        addon_module("outputs.shared.disk_sync").check_shot(scene, parameters)
 
 
 @pytest.mark.parametrize("images", [1, 8])
@@ -331,7 +331,7 @@ def test_a_picture_gives_the_disk_its_colours(
     premultiplied = np.concatenate([colour * alpha[..., None], alpha[..., None]], axis=-1)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), premultiplied)
     assert_same(picture, expected, light)
-    rows = addon_module("disk_images").mean_of_rows(image)
+    rows = addon_module("nodes.disk_images").mean_of_rows(image)
     np.testing.assert_allclose(rows, premultiplied.mean(axis=1), atol=2e-3)
     hole.umbra.disk.texture_use = "DENSITY"
     groups = [each.name for each in bpy.data.node_groups if each.name.startswith("Umbra Disk")]
@@ -345,7 +345,7 @@ def test_objects_stand_in_front_of_the_disk(
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=scene.camera.location * 0.5)
     picture = render(scene, tmp_path / "picture.exr", modules.exr)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
-    tree = addon_module("compositor_tree").find_setup(scene)
+    tree = addon_module("outputs.shared.compositor_tree").find_setup(scene)
     (link,) = tree.group.inputs["Render"].links
     layer = link.from_socket
     for each in list(tree.group.outputs["Image"].links):

@@ -45,13 +45,13 @@ def test_passes_lie_beside_the_map_and_hold(
         "Scene_Black_Hole_48x27_disk2_0001.exr",
         "Scene_Black_Hole_48x27_disk3_0001.exr",
     ]
-    physics = addon_module("_physics").physics
+    physics = addon_module("core.physics_api").physics
     warp_map = physics.read_warp_map(tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr")
     for number in (1, 2, 3):
         one = physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
         assert one.metadata["crossing"] == number
         assert one.metadata["hash"] == warp_map.metadata["hash"]
-    maps = addon_module("maps")
+    maps = addon_module("bake.maps")
     assert maps.count_baked(scene, hole.name, (48, 27), range(1, 5)) == 1
 
 
@@ -102,7 +102,7 @@ def test_a_spoilt_pass_makes_the_frame_stale(
     number: int,
     spoil: Callable[[Path], None],
 ) -> None:
-    maps, shot = addon_module("maps"), addon_module("shot")
+    maps, shot = addon_module("bake.maps"), addon_module("scene.frame_setup")
     bake()
     scene.camera.location.x += 1.0
     scene.frame_set(2)
@@ -129,7 +129,7 @@ def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
     hole.keyframe_insert("rotation_euler", frame=2)
     scene.frame_start, scene.frame_end = 1, 2
     assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
-    physics = addon_module("_physics").physics
+    physics = addon_module("core.physics_api").physics
     first, second = (
         physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk1_000{frame}.exr") for frame in (1, 2)
     )
@@ -145,7 +145,7 @@ def test_switching_the_disk_off_takes_all_of_it_away(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
 ) -> None:
     hole = add_hole(scene)
-    setup = addon_module("compositor_tree").find_setup(scene)
+    setup = addon_module("outputs.shared.compositor_tree").find_setup(scene)
     links, nodes = links_of(setup.tree), len(setup.tree.nodes)
     images, groups, objects = (set(each.keys()) for each in (bpy.data.images, bpy.data.node_groups, bpy.data.objects))
     hole.umbra.disk.enabled = True
@@ -166,13 +166,13 @@ def test_removing_the_set_up_removes_the_disk_and_a_new_one_brings_it_back(
     assert bpy.ops.umbra.remove_compositor() == {"FINISHED"}
     assert not any(each.name.startswith("Umbra") for each in bpy.data.node_groups)
     assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
-    assert addon_module("compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
+    assert addon_module("outputs.shared.compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
 
 
 def test_a_damaged_group_is_rebuilt_when_the_file_is_opened(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    groups = [addon_module("disk_group").group_of(3), addon_module("disk_group").image_group(False)]
+    groups = [addon_module("nodes.disk_group").group_of(3), addon_module("nodes.disk_group").image_group(False)]
     for group in groups:
         tree = group.find()
         tree[group.version_key] = 0
@@ -191,8 +191,8 @@ def test_the_first_versions_group_gives_way_to_the_one_that_fits(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     """A file as version 1 left it: one group for all disks, sockets in another order, and a table of the profile."""
-    setup = addon_module("compositor_tree").find_setup(scene)
-    node = addon_module("compositor_tree").find_node(setup.tree, "disk")
+    setup = addon_module("outputs.shared.compositor_tree").find_setup(scene)
+    node = addon_module("outputs.shared.compositor_tree").find_node(setup.tree, "disk")
     former = bpy.data.node_groups.new("Umbra Disk", "CompositorNodeTree")
     former["umbra_disk_version"] = 1
     former.interface.new_socket("Disk", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -207,7 +207,7 @@ def test_the_first_versions_group_gives_way_to_the_one_that_fits(
     setup.tree.links.new(table.outputs["Image"], node.inputs["Profile"])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    tree = addon_module("compositor_tree").find_setup(bpy.context.scene).tree
+    tree = addon_module("outputs.shared.compositor_tree").find_setup(bpy.context.scene).tree
     assert (links_of(tree), [curve.data_path for curve in tree.animation_data.drivers]) == wanted
     assert "Umbra Disk" not in bpy.data.node_groups
     assert not any(image.name.startswith("Umbra Disk Profile") for image in bpy.data.images)
@@ -219,14 +219,14 @@ def test_a_missing_pass_is_magenta(
     """Where nothing checks: in a Blender whose handlers do not run."""
     bake()
     (tmp_path / "maps" / "Scene_Black_Hole_48x27_disk2_0001.exr").unlink()
-    handlers = addon_module("handlers")
+    handlers = addon_module("render.handlers")
     handlers.unregister()
     try:
         scene.render.filepath = str(tmp_path / "picture.exr")
         bpy.ops.render.render(write_still=True)
     finally:
         handlers.register()
-    pixels, _ = addon_module("_physics").exr.read_exr(tmp_path / "picture.exr")
+    pixels, _ = addon_module("core.physics_api").exr.read_exr(tmp_path / "picture.exr")
     np.testing.assert_allclose(pixels[..., :3], np.broadcast_to((1.0, 0.0, 1.0), pixels[..., :3].shape), atol=1e-6)
 
 
@@ -260,7 +260,7 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     }  # fmt: skip
     for name, value in values.items():
         setattr(settings, name, value)
-    light = addon_module("disk_light").find(hole)
+    light = addon_module("outputs.shared.disk_light").find(hole)
     assert light is not None
     assert not light.visible_camera
     scale = hole.umbra.mass_scale
@@ -286,7 +286,7 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     scene.render.use_compositing = False
     scene.render.filepath = str(tmp_path / "lit.exr")
     bpy.ops.render.render(write_still=True)
-    modules = addon_module("_physics")
+    modules = addon_module("core.physics_api")
     pixels, _ = modules.exr.read_exr(tmp_path / "lit.exr")
     lit = pixels[12:15, 22:26].reshape(-1, 4)
     assert (lit[:, 3] == 1.0).all()
@@ -318,14 +318,14 @@ def test_light_follows_keyframes(
     scene.render.filepath = str(tmp_path / "lit_####.exr")
     scene.frame_set(2)
     bpy.ops.render.render(animation=True)
-    exr = addon_module("_physics").exr
+    exr = addon_module("core.physics_api").exr
     lit = [exr.read_exr(tmp_path / f"lit_{frame:04d}.exr")[0][..., :3].sum() for frame in (1, 2, 3)]
     assert lit[0] > 1.0
     # Blender's eased curve is half-way at frame 2: one stop, and three quarters.
     # Cycles picks the same faces with other shares of the light: a percent with so few samples.
     assert lit[1] / lit[0] == pytest.approx(1.5, rel=0.03)
     assert lit[2] / lit[0] == pytest.approx(2.0, rel=0.03)
-    light = addon_module("disk_light").find(hole)
+    light = addon_module("outputs.shared.disk_light").find(hole)
     scene.frame_set(1)
     brightest = max(each.color[0] for each in light.data.attributes["Light"].data)
     scene.frame_set(3)
@@ -336,11 +336,11 @@ def test_light_goes_with_its_hole(
     scene: bpy.types.Scene, hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]
 ) -> None:
     hole.umbra.disk.light = True
-    assert addon_module("disk_light").find(hole) is not None
+    assert addon_module("outputs.shared.disk_light").find(hole) is not None
     bpy.data.objects.remove(hole)
-    addon_module("disk_sync").refresh(scene)
+    addon_module("outputs.shared.disk_sync").refresh(scene)
     assert not any("umbra_disk_light" in each for each in bpy.data.objects)
-    assert not addon_module("compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
+    assert not addon_module("outputs.shared.compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
 
 
 def test_holes_of_two_scenes_keep_values_of_their_own(
@@ -352,13 +352,16 @@ def test_holes_of_two_scenes_keep_values_of_their_own(
     second.umbra.is_black_hole = True
     second.umbra.spin = 0.1
     other.umbra.active_hole = second
-    addon_module("compositing").set_up(other)
+    addon_module("outputs.compositor.compositing").set_up(other)
     second.umbra.disk.enabled = True
-    find_setup, find_node = addon_module("compositor_tree").find_setup, addon_module("compositor_tree").find_node
+    find_setup, find_node = (
+        addon_module("outputs.shared.compositor_tree").find_setup,
+        addon_module("outputs.shared.compositor_tree").find_node,
+    )
     nodes = [find_node(find_setup(each).tree, "disk") for each in (scene, other)]
     spins = [each.inputs["Spin"].default_value for each in nodes]
     assert spins == pytest.approx([0.9, 0.1])
-    metric = addon_module("_physics").metric
+    metric = addon_module("core.physics_api").metric
     edges = [each.inputs["Inner Edge"].default_value for each in nodes]
     assert edges == pytest.approx([metric.isco_radius(spin) for spin in spins])
 
@@ -392,7 +395,7 @@ class Layout:
 
 
 def test_panel_shows_every_setting(hole: bpy.types.Object, addon_module: Callable[[str], ModuleType]) -> None:
-    panels = addon_module("disk_panel")
+    panels = addon_module("ui.disk_panel")
     drawn: list[str] = []
     settings = hole.umbra.disk
 

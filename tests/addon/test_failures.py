@@ -107,7 +107,7 @@ scene.umbra.environment_image = loaded
 def test_a_fault_of_our_own_is_not_swallowed(tmp_path: Path) -> None:
     change = """
 import importlib
-importlib.import_module("bl_ext.user_default.umbra_black_hole.shot").read = lambda *_: 1 / 0
+importlib.import_module("bl_ext.user_default.umbra_black_hole.scene.frame_setup").read = lambda *_: 1 / 0
 """
     fails(tmp_path, change, "ZeroDivisionError", [])
 
@@ -120,11 +120,11 @@ def test_with_a_window_the_picture_is_magenta(
     shrink(scene)
     scene.umbra.map_folder = str(tmp_path / "maps")
     hole = add_hole(scene)
-    exr = addon_module("_physics").exr
+    exr = addon_module("core.physics_api").exr
     good = render(scene, tmp_path / "good.exr", exr)
     shown: list[str] = []
-    handlers = addon_module("handlers")
-    monkeypatch.setattr(addon_module("messages"), "popup", shown.append)
+    handlers = addon_module("render.handlers")
+    monkeypatch.setattr(addon_module("core.messages"), "popup", shown.append)
     monkeypatch.setattr(handlers, "without_window", lambda: False)
     hole.scale = (1.0, 1.0, 2.0)
     picture = render(scene, tmp_path / "bad.exr", exr)

@@ -114,7 +114,7 @@ def test_a_ball_is_seen_where_its_ray_says(scene, tmp_path, exr, addon_module, s
 
     A primary image stands on the same side of the hole as its ball, a secondary one on the other.
     """
-    physics = addon_module("_physics").physics
+    physics = addon_module("core.physics_api").physics
     length, r_cam = 0.2, 30.0
     position = (0.0, -r_cam, 0.0)
     observer = physics.WarpMapParameters(
@@ -238,7 +238,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
     Cycles' narrowest filter places a sample within half a hundredth of a pixel of its centre: so much of the difference
     between neighbours is allowed besides.
     """
-    physics = addon_module("_physics").physics
+    physics = addon_module("core.physics_api").physics
     show_directions(scene)
     scene.camera.location = (0.3, -6.0, 2.0)
     scene.camera.rotation_euler = (math.radians(72.0), 0.0, 0.05)
@@ -246,7 +246,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
     hole.rotation_euler = (0.2, -0.3, 0.5)
     scene.umbra.lens_rays = rays
     picture = render(scene, tmp_path / "directions.exr", exr)[..., :3].astype(float) - 1.0
-    warp_map = physics.bake(addon_module("shot").read_at(scene, scene.frame_current).parameters)
+    warp_map = physics.bake(addon_module("scene.frame_setup").read_at(scene, scene.frame_current).parameters)
     clear = warp_map.visibility == 1.0
     for _ in range(2):
         grown = clear.copy()
@@ -269,7 +269,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
 @pytest.mark.parametrize("rays", ["IN_SHADER", "EXIT_MAP"])
 def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon_module, rays) -> None:
     """A World of one colour, seen from a fast orbit: each pixel is that colour times the gain of its own 1 + z."""
-    physics, colour = addon_module("_physics").physics, addon_module("_physics").colour
+    physics, color = addon_module("core.physics_api").physics, addon_module("core.physics_api").color
     scene.world = bpy.data.worlds.new("Uniform")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.5, 0.2, 1.0)
@@ -278,9 +278,9 @@ def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon
     scene.umbra.lens_rays, scene.umbra.sky_temperature = rays, 5000.0
     scene.umbra.redshift_colour, scene.umbra.redshift_brightness = 0.7, 1.0
     picture = render(scene, tmp_path / "shifted.exr", exr)[..., :3]
-    warp_map = physics.bake(addon_module("shot").read_at(scene, scene.frame_current).parameters)
+    warp_map = physics.bake(addon_module("scene.frame_setup").read_at(scene, scene.frame_current).parameters)
     clear = warp_map.visibility == 1.0
-    gain = colour.redshift_gain(warp_map.one_plus_z[clear].astype(float), 0.7, 1.0, 5000.0)
+    gain = color.redshift_gain(warp_map.one_plus_z[clear].astype(float), 0.7, 1.0, 5000.0)
     expected = gain * np.array([0.8, 0.5, 0.2])
     assert expected[:, 0].max() > 1.5 * expected[:, 0].min()
     # Single precision, and samples half a hundredth of a pixel off its centre.

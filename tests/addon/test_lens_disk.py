@@ -50,14 +50,21 @@ def expected_picture(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType], behind: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The disk of the current frame over a picture, by numpy in float64, and the light of the disk in it."""
-    modules, maps, disk = addon_module("_physics"), addon_module("maps"), addon_module("lens_disk")
+    modules, maps, disk = (
+        addon_module("core.physics_api"),
+        addon_module("bake.maps"),
+        addon_module("outputs.lens.lens_disk"),
+    )
     settings = scene.umbra.active_hole.umbra.disk
-    frame = addon_module("shot").read_at(scene, scene.frame_current)
+    frame = addon_module("scene.frame_setup").read_at(scene, scene.frame_current)
     paths = maps.pass_paths(disk.path_of(scene, frame), frame.parameters)
     passes = [modules.physics.read_disk_pass(each) for each in paths]
     time = scene.frame_current * settings.turning_speed * scene.render.fps_base / scene.render.fps
-    look, texture = addon_module("disk_properties").look_of(settings), addon_module("disk_images").streaks()
-    period = addon_module("disk_animation").pattern_period(scene, scene.umbra.active_hole)
+    look, texture = (
+        addon_module("settings.disk_properties").look_of(settings),
+        addon_module("nodes.disk_images").streaks(),
+    )
+    period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
     light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
     size = behind.shape[1], behind.shape[0]
     return modules.disk_render.over_sky(behind, light, through), modules.reference_render.resize(light, size)
@@ -156,7 +163,10 @@ def artists_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
 
 @pytest.mark.parametrize("own_tree", [False, True])
 def test_switching_leaves_no_trace(scene, addon_module, own_tree) -> None:
-    find_tree, in_use = addon_module("compositor_tree").find_tree, addon_module("lens_disk").is_in_use
+    find_tree, in_use = (
+        addon_module("outputs.shared.compositor_tree").find_tree,
+        addon_module("outputs.lens.lens_disk").is_in_use,
+    )
     scene.render.compositor_precision = "AUTO"
     if own_tree:
         artists_tree(scene)
@@ -164,7 +174,7 @@ def test_switching_leaves_no_trace(scene, addon_module, own_tree) -> None:
     hole = add_hole(scene)
     assert in_use(scene)
     scene.umbra.supersampling = "2"
-    passes = addon_module("disk_sync").passes_of(find_tree(scene))
+    passes = addon_module("outputs.shared.disk_sync").passes_of(find_tree(scene))
     assert all("_192x108_" in node.image.filepath for node, _ in passes)
     hole.umbra.disk.enabled = False
     assert state_of(scene, find_tree(scene)) == without
@@ -177,7 +187,7 @@ def test_switching_leaves_no_trace(scene, addon_module, own_tree) -> None:
 
 @pytest.mark.parametrize("own_tree", [False, True])
 def test_the_bent_sky_and_its_disk_come_back(scene, addon_module, own_tree) -> None:
-    find_tree = addon_module("compositor_tree").find_tree
+    find_tree = addon_module("outputs.shared.compositor_tree").find_tree
     if own_tree:
         artists_tree(scene)
     add_hole(scene, output="COMPOSITOR")
@@ -186,8 +196,8 @@ def test_the_bent_sky_and_its_disk_come_back(scene, addon_module, own_tree) -> N
     assert before["drivers"] > 0
     for _ in range(2):
         scene.umbra.output = "CYCLES_LENS"
-        assert addon_module("lens_disk").is_in_use(scene)
-        assert addon_module("compositor_tree").find_setup(scene) is None
+        assert addon_module("outputs.lens.lens_disk").is_in_use(scene)
+        assert addon_module("outputs.shared.compositor_tree").find_setup(scene) is None
         scene.umbra.output = "COMPOSITOR"
         assert state_of(scene, find_tree(scene)) == before
 
@@ -195,7 +205,10 @@ def test_the_bent_sky_and_its_disk_come_back(scene, addon_module, own_tree) -> N
 @pytest.mark.parametrize("disk_first", [True, False])
 def test_disk_and_foreground_share_the_compositor(scene, addon_module, disk_first) -> None:
     """Whichever goes first, the other stays, and when both are gone nothing is left."""
-    find_tree, find_node = addon_module("compositor_tree").find_tree, addon_module("compositor_tree").find_node
+    find_tree, find_node = (
+        addon_module("outputs.shared.compositor_tree").find_tree,
+        addon_module("outputs.shared.compositor_tree").find_node,
+    )
     bpy.ops.mesh.primitive_cube_add(size=0.25, location=(0.3, -4.0, 1.0))
     without = state_of(scene, find_tree(scene))
     hole = add_hole(scene)
@@ -212,7 +225,7 @@ def test_disk_and_foreground_share_the_compositor(scene, addon_module, disk_firs
         assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
     else:
         assert bpy.ops.umbra.remove_foreground() == {"FINISHED"}
-        assert addon_module("lens_disk").is_in_use(scene)
+        assert addon_module("outputs.lens.lens_disk").is_in_use(scene)
         hole.umbra.disk.enabled = False
     assert state_of(scene, find_tree(scene)) == without
 
@@ -280,7 +293,9 @@ def test_what_is_not_drawn_right_is_named(scene, addon_module) -> None:
 
     def warnings() -> list[str]:
         depsgraph.update()
-        return addon_module("lens_objects").warnings(scene, depsgraph, addon_module("shot").read(scene, depsgraph))
+        return addon_module("outputs.lens.lens_objects").warnings(
+            scene, depsgraph, addon_module("scene.frame_setup").read(scene, depsgraph)
+        )
 
     assert warnings() == []
     scene.render.use_compositing = False
@@ -296,12 +311,12 @@ def test_what_is_not_drawn_right_is_named(scene, addon_module) -> None:
 def test_verify_and_clean_know_the_disks_map_beside_the_exit_map(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    cache, baking = addon_module("cache"), addon_module("baking")
+    cache, baking = addon_module("bake.cache"), addon_module("bake.baking")
     add_hole(scene)
     assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
     listing = baking.drain(cache.examine(scene.name, [scene.frame_current]))
     assert listing.complete
-    folder = addon_module("maps").folder(scene).path
+    folder = addon_module("bake.maps").folder(scene).path
     (disk,) = [each for each in folder.glob("*.exr") if "_exit_" not in each.name and "_disk" not in each.name]
     assert listing.frames[0].size == sum(each.stat().st_size for each in folder.glob("*.exr"))
     disk.write_bytes(disk.read_bytes()[:-100])
@@ -318,7 +333,7 @@ def test_the_command_bakes_the_disk_of_a_lens_without_maps(
 ) -> None:
     add_hole(scene)
     scene.umbra.lens_rays = "IN_SHADER"
-    assert addon_module("command").run(["bake", f"--frames={scene.frame_current}"]) == 0
+    assert addon_module("command.command_line").run(["bake", f"--frames={scene.frame_current}"]) == 0
     assert list((tmp_path / "maps").glob("*_disk1_*.exr"))
 
 
@@ -331,12 +346,12 @@ def test_strips_that_move_the_look_are_refused(
     strip = animation.nla_tracks.new().strips.new("Look", 1, action)
     strip.action_slot = animation.action_slot
     animation.action = None
-    frame = addon_module("shot").read_at(scene, 1)
-    with pytest.raises(addon_module("errors").SceneError, match="strips of the Nonlinear Animation"):
-        addon_module("disk_sync").check_shot(scene, frame.parameters)
+    frame = addon_module("scene.frame_setup").read_at(scene, 1)
+    with pytest.raises(addon_module("core.errors").SceneError, match="strips of the Nonlinear Animation"):
+        addon_module("outputs.shared.disk_sync").check_shot(scene, frame.parameters)
 
 
 def test_names_that_look_like_an_exit_maps(addon_module: Callable[[str], ModuleType]) -> None:
-    maps = addon_module("maps")
+    maps = addon_module("bake.maps")
     assert maps.kind_of(Path("Airlock_exit_corridor_Hole_64x36_0001.exr")) is maps.WARP_MAP
     assert maps.kind_of(Path("Scene_Hole_64x36_0001_exit_0123456789ab.exr")) is maps.EXIT_MAP

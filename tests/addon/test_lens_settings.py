@@ -37,7 +37,7 @@ def test_switching_back_restores_the_camera(scene) -> None:
 
 def test_the_compositor_comes_back_with_its_look(scene, addon_module) -> None:
     assert bpy.ops.umbra.add_black_hole() == {"FINISHED"}
-    find = addon_module("compositor_tree").find_setup
+    find = addon_module("outputs.shared.compositor_tree").find_setup
     find(scene).group.inputs["Exposure"].default_value = 1.5
     find(scene).group.inputs["Redshift Colour"].default_value = 0.25
     scene.umbra.output = "CYCLES_LENS"
@@ -71,15 +71,15 @@ def test_objects_inside_the_sphere_are_named(scene, addon_module) -> None:
     ball.name = "Probe"
     add_lens(scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    frame = addon_module("shot").read(scene, depsgraph)
-    (sentence,) = addon_module("lens_objects").warnings(scene, depsgraph, frame)
+    frame = addon_module("scene.frame_setup").read(scene, depsgraph)
+    (sentence,) = addon_module("outputs.lens.lens_objects").warnings(scene, depsgraph, frame)
     assert sentence.startswith('"Probe" reaches into the lens sphere')
 
 
 def test_bytecode_names_no_place(addon_module) -> None:
     """It is saved with the camera, and must be the same in every session."""
     for uses_map in (False, True):
-        code, _ = addon_module("lens_shader").bytecode(uses_map=uses_map)
+        code, _ = addon_module("outputs.lens.lens_shader").bytecode(uses_map=uses_map)
         assert "shader umbra_lens" in code
         assert "/" not in code
         assert "\\" not in code.replace("\\n", "")
@@ -139,7 +139,7 @@ def test_an_animation_follows_the_camera_that_a_marker_binds(scene, tmp_path, ex
 
 
 def test_a_gpu_without_shaders_is_named_and_the_cpu_renders_if_it_may(scene, tmp_path, exr, addon_module) -> None:
-    shader = addon_module("lens_shader")
+    shader = addon_module("outputs.lens.lens_shader")
     preferences = bpy.context.preferences.addons["cycles"].preferences
     kinds = [each[0] for each in preferences.get_device_types(bpy.context)]
     others = [kind for kind in kinds if kind not in shader.DEVICES_WITH_SHADERS]

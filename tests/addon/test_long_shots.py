@@ -19,7 +19,8 @@ FRAMES = 12
 BAKE = """
 import importlib
 name = "bl_ext.user_default.umbra_black_hole."
-command, exr = importlib.import_module(name + "command"), importlib.import_module(name + "physics.exr")
+command = importlib.import_module(name + "command.command_line")
+exr = importlib.import_module(name + "physics.images.exr")
 bpy.ops.wm.open_mainfile(filepath={blend!r})
 {trap}
 sys.exit(command.run({arguments!r}))
@@ -92,7 +93,7 @@ def test_a_bake_that_is_killed_again_and_again(
     """Killed with a file half written, before one gets its name, between passes and map, and from outside."""
     bpy.context.scene.umbra.active_hole.umbra.disk.enabled = True  # four files a frame
     bpy.ops.wm.save_mainfile()
-    package = addon_module("_physics").physics
+    package = addon_module("core.physics_api").physics
     folder = tmp_path / "umbra_maps"
     half = "lambda path, *_: Path(path).write_bytes(b'half of it')"
     traps = [  # what is to happen, and whether a half file is left
@@ -129,7 +130,7 @@ def test_a_bake_that_is_killed_again_and_again(
 
 
 def test_three_processes_share_a_folder(blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]) -> None:
-    package = addon_module("_physics").physics
+    package = addon_module("core.physics_api").physics
     processes = [start_python(bake(blend, arguments=("bake", "--json", "--frames", "1-40"))) for _ in range(3)]
     outputs = [process.communicate(timeout=300) for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0], outputs
@@ -152,7 +153,7 @@ def test_being_told_to_stop(blend: str, tmp_path: Path, addon_module: Callable[[
     assert process.returncode == 1
     assert "Stopped; the maps that are finished stay." in errors
     assert events(output)[-1]["error"].startswith("Stopped")
-    maps = check_folder(tmp_path / "umbra_maps", addon_module("_physics").physics)
+    maps = check_folder(tmp_path / "umbra_maps", addon_module("core.physics_api").physics)
     assert 1 <= len(maps) < 200
     assert not hidden(tmp_path / "umbra_maps")
 
@@ -172,9 +173,9 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    scene, baking, modules = bpy.context.scene, addon_module("baking"), addon_module("_physics")
+    scene, baking, modules = bpy.context.scene, addon_module("bake.baking"), addon_module("core.physics_api")
     path, parameters = baking.maps_at(scene, 1)[0]
-    claim = claim_elsewhere(path, modules.claim)
+    claim = claim_elsewhere(path, addon_module("bake.claim"))
     waits = []
 
     def other_machine(_seconds: float) -> None:
@@ -201,8 +202,8 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
 def test_a_render_that_waits_can_be_stopped(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    path, _parameters = addon_module("baking").maps_at(bpy.context.scene, 1)[0]
-    claim_elsewhere(path, addon_module("_physics").claim)
+    path, _parameters = addon_module("bake.baking").maps_at(bpy.context.scene, 1)[0]
+    claim_elsewhere(path, addon_module("bake.claim"))
     render = f"bpy.ops.wm.open_mainfile(filepath={blend!r}); bpy.ops.render.render(animation=True)"
     with start_python(render) as process:
         for line in process.stdout:
@@ -217,9 +218,9 @@ def test_a_render_that_waits_can_be_stopped(
 def test_a_bake_does_other_frames_first_and_then_waits(
     blend: str, addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene, baking, modules = bpy.context.scene, addon_module("baking"), addon_module("_physics")
+    scene, baking = bpy.context.scene, addon_module("bake.baking")
     path, _parameters = baking.maps_at(scene, 1)[0]
-    claim = claim_elsewhere(path, modules.claim)
+    claim = claim_elsewhere(path, addon_module("bake.claim"))
     monkeypatch.setattr(baking, "POLL", 2 * baking.WAIT)
     texts = []
     for progress in baking.bake_frames(scene.name, [1, 2, 3]):
@@ -233,10 +234,10 @@ def test_a_bake_does_other_frames_first_and_then_waits(
 def test_a_frame_that_is_being_baked_is_not_cleaned_away(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene, baking, command = bpy.context.scene, addon_module("baking"), addon_module("command")
+    scene, baking, command = bpy.context.scene, addon_module("bake.baking"), addon_module("command.command_line")
     assert command.run(["bake", "--frames", "1-2"]) == 0
     path, _parameters = baking.maps_at(scene, 1)[0]
-    claim = claim_elsewhere(path, addon_module("_physics").claim)
+    claim = claim_elsewhere(path, addon_module("bake.claim"))
     half = path.with_name(f".{path.stem}.abcdefgh.tmp.exr")
     half.write_bytes(b"half")
     assert command.run(["clean", "--all", "--json"]) == 0

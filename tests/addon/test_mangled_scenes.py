@@ -17,7 +17,7 @@ import pytest
 from small_scene import add_hole, compositor, render, shrink
 
 import physics
-from physics import exr
+from physics.images import exr
 
 ROLE = "umbra_role"
 MAGENTA = (1.0, 0.0, 1.0)
@@ -236,9 +236,9 @@ def call(name: str, **arguments: object) -> bool:
 
 def draw_and_handle(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene, tmp_path: Path) -> None:
     """The panel's lines, saving and opening: none may fail."""
-    assert addon_module("status").lines(bpy.context)
-    addon_module("status").sky_problem(scene)
-    handlers = addon_module("handlers")
+    assert addon_module("ui.status").lines(bpy.context)
+    addon_module("ui.status").sky_problem(scene)
+    handlers = addon_module("render.handlers")
     handlers.on_save_pre(str(tmp_path / "saved.blend"))
     handlers.on_load_post("")
     bpy.context.view_layer.update()
@@ -249,11 +249,11 @@ def shows_or_refuses(
 ) -> None:
     """Render as with a window, where a failure is told and the picture is magenta."""
     told: list[str] = []
-    messages = addon_module("messages")
+    messages = addon_module("core.messages")
     monkeypatch.setattr(messages, "popup", told.append)
     monkeypatch.setattr(messages, "warn", told.append)
-    monkeypatch.setattr(addon_module("handlers"), "without_window", lambda: False)
-    in_use = addon_module("compositor_tree").is_in_use(scene)
+    monkeypatch.setattr(addon_module("render.handlers"), "without_window", lambda: False)
+    in_use = addon_module("outputs.shared.compositor_tree").is_in_use(scene)
     try:
         picture = render(scene, path, exr)
     except RuntimeError as error:  # Blender's own: no camera, no output
@@ -311,7 +311,9 @@ def test_a_mangled_scene_whole_again_shows_the_same_picture(
     addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All damage to the set-up itself is undone by Set Up Compositor, to the pixel."""
-    monkeypatch.setattr(addon_module("handlers"), "without_window", lambda: False)  # a failure must not end the test
+    monkeypatch.setattr(
+        addon_module("render.handlers"), "without_window", lambda: False
+    )  # a failure must not end the test
     before = render(scene, tmp_path / "before.exr", exr)
     empty_group(scene, random.Random(0))  # found and mended by the render itself
     np.testing.assert_allclose(render(scene, tmp_path / "mended.exr", exr), before, atol=1e-6)

@@ -47,7 +47,7 @@ noted = []
 
 BAKE = """
 import importlib
-baking = importlib.import_module("bl_ext.user_default.umbra_black_hole.baking")
+baking = importlib.import_module("bl_ext.user_default.umbra_black_hole.bake.baking")
 for progress in baking.bake_frames(scene.name, range(1, frames + 1)):
     if progress.outcome:
         note()

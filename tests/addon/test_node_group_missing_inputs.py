@@ -21,7 +21,7 @@ from compositor_scene import (
     write_exr,
 )
 
-from physics import reference_render
+from physics.reference import reference_render
 
 SIZE = (48, 27)
 MAGENTA = (1.0, 0.0, 1.0, 1.0)
@@ -30,7 +30,7 @@ NEUTRAL = {"Image": MAGENTA, "Sky": MAGENTA, "Shadow": (0.0, 0.0, 0.0, 1.0), "Re
 
 @pytest.fixture
 def node_group(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("node_group")
+    return addon_module("nodes.black_hole_group")
 
 
 @pytest.fixture

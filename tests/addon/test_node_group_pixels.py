@@ -32,7 +32,8 @@ from compositor_scene import (
     write_exr,
 )
 
-from physics import reference_render, sphere
+from physics.numerics import sphere
+from physics.reference import reference_render
 
 COLOURS = 2e-6
 TEXELS = 1e-4
@@ -48,7 +49,7 @@ ROTATIONS = [
 
 @pytest.fixture
 def node_group(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("node_group")
+    return addon_module("nodes.black_hole_group")
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from compositor_scene import (
     write_exr,
 )
 
-from physics import reference_render
+from physics.reference import reference_render
 
 SIZE = (32, 18)
 VALUES = {"Environment Strength": 1.75, "Exposure": -0.5, "Redshift Colour": 0.25, "Sky Temperature": 5000.0}
@@ -30,7 +30,7 @@ ROTATION = (0.1, 0.2, 0.3)
 
 @pytest.fixture
 def node_group(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("node_group")
+    return addon_module("nodes.black_hole_group")
 
 
 def interface_sockets(tree: bpy.types.NodeTree, in_out: str) -> list[bpy.types.NodeTreeInterfaceSocket]:

@@ -29,7 +29,8 @@ from compositor_scene import (
 )
 from mathutils import Euler, Matrix
 
-from physics import reference_render, sphere
+from physics.numerics import sphere
+from physics.reference import reference_render
 
 SIZE = (64, 36)
 STRENGTH = 1.7
@@ -98,7 +99,7 @@ def test_identity_map_shows_the_world_as_cycles_does(
     by_cycles = render_pixels(scene, tmp_path / "cycles.exr")
 
     warp_map = identity_map(Euler(VIEWS[view]).to_matrix())
-    by_group = GroupRenderer(addon_module("node_group"), tmp_path).render(
+    by_group = GroupRenderer(addon_module("nodes.black_hole_group"), tmp_path).render(
         SIZE,
         warp_map=warp_map,
         environment=sky,

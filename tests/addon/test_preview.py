@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning
 @pytest.fixture
 def preview(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """The module, as if there were a window; timers do not fire in background, so tests call `settle`."""
-    module = addon_module("preview")
+    module = addon_module("preview.live_preview")
     module.forget()
     monkeypatch.setattr(module, "can_run", lambda: not module._suspended)
     monkeypatch.setattr(module, "SETTLE", 0.0)
@@ -29,17 +29,17 @@ def preview(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.Monke
 
 @pytest.fixture
 def world_sync(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("world_sync")
+    return addon_module("outputs.world.world_sync")
 
 
 @pytest.fixture
 def thumbnail(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("thumbnail")
+    return addon_module("preview.thumbnail")
 
 
 @pytest.fixture
 def physics(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics")
+    return addon_module("core.physics_api")
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def shown(scene: bpy.types.Scene, world_sync: ModuleType) -> np.ndarray:
 
 def expected(scene: bpy.types.Scene, physics: ModuleType, addon_module) -> np.ndarray:
     """The map as numpy makes it for where the camera is now."""
-    frame = addon_module("shot").read(scene, bpy.context.evaluated_depsgraph_get(), velocity=np.zeros(3))
+    frame = addon_module("scene.frame_setup").read(scene, bpy.context.evaluated_depsgraph_get(), velocity=np.zeros(3))
     draft = replace(frame.parameters, tolerance=1e-4)
     world_map = physics.world_map
     steps = world_map.world_map_steps(world_map.world_parameters(draft, world_map.PREVIEW))
@@ -184,7 +184,7 @@ def test_switched_off_with_the_add_on_it_leaves_worlds_that_read_files(
 ) -> None:
     start(scene, preview)
     assert world_sync.shows_live(scene)
-    panel = addon_module("preview_panel")
+    panel = addon_module("ui.preview_panel")
     panel.unregister()
     try:
         assert not world_sync.shows_live(scene)
@@ -231,7 +231,7 @@ def test_a_render_reads_files_and_the_preview_comes_back(scene, preview, world_s
 
 
 def test_the_preview_stays_away_without_a_window(scene, addon_module, world_sync) -> None:
-    preview = addon_module("preview")
+    preview = addon_module("preview.live_preview")
     start(scene, preview)
     scene.camera.location.x += 0.3
     bpy.context.view_layer.update()

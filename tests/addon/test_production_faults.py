@@ -18,12 +18,12 @@ Run = Callable[[str], int]
 
 @pytest.fixture
 def run(addon_module: Callable[[str], ModuleType]) -> Run:
-    return lambda line: addon_module("command").run(line.split())
+    return lambda line: addon_module("command.command_line").run(line.split())
 
 
 @pytest.fixture
 def modules(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics")
+    return addon_module("core.physics_api")
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_a_disk_that_is_full(
     scene.camera.keyframe_insert("location", frame=60)
     if not foreseen:
         usage = SimpleNamespace(total=10**9, used=0, free=10**9)
-        monkeypatch.setattr(addon_module("maps").shutil, "disk_usage", lambda _path: usage)
+        monkeypatch.setattr(addon_module("bake.maps").shutil, "disk_usage", lambda _path: usage)
     assert run("bake --frames 1-60") == 1
     error = capfd.readouterr().err
     assert "Frame " in error

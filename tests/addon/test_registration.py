@@ -56,7 +56,7 @@ def test_a_failure_half_way_is_loud_and_undone(
         raise RuntimeError("no")
 
     with monkeypatch.context() as patch:
-        patch.setattr(addon_module("handlers"), "register", fail)
+        patch.setattr(addon_module("render.handlers"), "register", fail)
         with pytest.raises(RuntimeError, match="no"):
             addon.register()
     assert not hasattr(bpy.types.Scene, "umbra")
@@ -86,7 +86,7 @@ def test_blender_ends_without_help(addon: ModuleType) -> None:
 def test_the_menu_offers_it(addon_module: Callable[[str], ModuleType]) -> None:
     menu = bpy.types.VIEW3D_MT_add
     functions = menu._dyn_ui_initialize()
-    assert addon_module("operators").draw_add_menu in functions
+    assert addon_module("ui.operators").draw_add_menu in functions
 
 
 def test_the_add_operator(addon: ModuleType) -> None:

@@ -27,12 +27,12 @@ PIXEL_TOLERANCE = 1e-4
 
 @pytest.fixture
 def physics(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics").physics
+    return addon_module("core.physics_api").physics
 
 
 @pytest.fixture
 def reference(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics").reference_render
+    return addon_module("core.physics_api").reference_render
 
 
 @pytest.fixture
@@ -292,8 +292,8 @@ def test_saving_and_loading(
     add_hole(scene, motion="STATIC")
     scene.umbra.map_folder = "//umbra_maps/"
     picture = render(scene, tmp_path / "before.exr", exr)
-    temporary = Path(bpy.path.abspath(addon_module("maps").folder(scene).blender_path))
-    assert addon_module("maps").folder(scene).is_temporary
+    temporary = Path(bpy.path.abspath(addon_module("bake.maps").folder(scene).blender_path))
+    assert addon_module("bake.maps").folder(scene).is_temporary
     assert len(list(temporary.glob("*.exr"))) >= 1
     blend = tmp_path / "saved" / "file.blend"
     blend.parent.mkdir()
@@ -304,13 +304,13 @@ def test_saving_and_loading(
     stamp = adopted.stat().st_mtime_ns
 
     # a file from an older version of the add-on: the group's version is stamped on it
-    addon_module("compositor_tree").find_setup(scene).group.node_tree["umbra_version"] = 0
+    addon_module("outputs.shared.compositor_tree").find_setup(scene).group.node_tree["umbra_version"] = 0
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     assert scene.umbra.active_hole.umbra.motion == "STATIC"
-    setup = addon_module("compositor_tree").find_setup(scene)
-    assert setup.group.node_tree["umbra_version"] == addon_module("node_group").GROUP_VERSION
+    setup = addon_module("outputs.shared.compositor_tree").find_setup(scene)
+    assert setup.group.node_tree["umbra_version"] == addon_module("nodes.black_hole_group").GROUP_VERSION
     assert setup.map.image.filepath == "//umbra_maps/Scene_Black_Hole_64x36_0001.exr"
     np.testing.assert_array_equal(render(scene, tmp_path / "after.exr", exr), picture)
     assert adopted.stat().st_mtime_ns == stamp
@@ -328,7 +328,7 @@ def test_the_compositor_device_is_set_back(scene: bpy.types.Scene, tmp_path: Pat
 
 def test_a_muted_group_needs_no_map(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, addon_module) -> None:
     add_hole(scene)
-    addon_module("compositor_tree").find_setup(scene).group.mute = True
+    addon_module("outputs.shared.compositor_tree").find_setup(scene).group.mute = True
     render(scene, tmp_path / "picture.exr", exr)
     assert not map_files(tmp_path)
 

@@ -14,7 +14,8 @@ from saved_scene import ARTISTS_NODE, GROUP, HOLE, ROTATION, SCENE, build, compo
 from small_scene import render
 
 import physics
-from physics import exr, reference_render
+from physics.images import exr
+from physics.reference import reference_render
 
 SAVED = Path(__file__).resolve().parents[1] / "data" / "saved_files"
 FILES = sorted(SAVED.glob("*.blend"))
@@ -58,7 +59,7 @@ def test_settings_and_links_are_kept_and_groups_brought_up_to_date(
     group = group_of(scene)
     assert {name: group.inputs[name].default_value for name in GROUP} == pytest.approx(GROUP)
     assert tuple(group.inputs["Environment Rotation"].default_value) == pytest.approx(ROTATION)
-    node_group = addon_module("node_group")
+    node_group = addon_module("nodes.black_hole_group")
     assert node_group.is_current(group.node_tree)
     assert group.node_tree[node_group.VERSION_KEY] == node_group.GROUP_VERSION
     assert [tree.name for tree in bpy.data.node_groups if node_group.is_group(tree)] == [node_group.GROUP_NAME]
@@ -82,7 +83,7 @@ def test_the_first_version_really_is_of_another_group(addon_module: Callable[[st
     groups = [tree for tree in bpy.data.node_groups if "umbra_version" in tree]
     assert [tree["umbra_version"] for tree in groups] == [1]
     assert not any(item.name == "Disk" for item in groups[0].interface.items_tree)
-    assert addon_module("node_group").GROUP_VERSION > 1
+    assert addon_module("nodes.black_hole_group").GROUP_VERSION > 1
 
 
 def test_the_first_version_renders_as_numpy_does(tmp_path: Path) -> None:

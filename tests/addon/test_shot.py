@@ -14,12 +14,12 @@ from small_scene import add_hole, shrink
 
 @pytest.fixture
 def shot(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("shot")
+    return addon_module("scene.frame_setup")
 
 
 @pytest.fixture
 def errors(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics").physics
+    return addon_module("core.physics_api").physics
 
 
 def read(shot: ModuleType, frame: int = 1):

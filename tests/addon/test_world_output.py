@@ -34,7 +34,7 @@ def modules(addon_module: Callable[[str], ModuleType]) -> Callable[[str], Module
 
 @pytest.fixture
 def physics(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("_physics")
+    return addon_module("core.physics_api")
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def predicted(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tu
     origin, one_plus_z, visible = map_of(scene, physics, frame).look_up(looking(scene, physics))
     turned = origin @ physics.reference_render.rotation_matrix(ROTATION).T
     colours = physics.reference_render.sample_environment(environment_pixels(), turned)
-    colours *= physics.colour.redshift_gain(one_plus_z, 1.0, 1.0, physics.colour.DEFAULT_TEMPERATURE)
+    colours *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
     colours[~visible] = 0.0
     polar = np.arccos(np.abs(turned[:, 2]).clip(max=1.0))
     return colours.reshape(*SIZE[::-1], 3), (polar > math.pi / 16).reshape(SIZE[::-1])
@@ -176,7 +176,7 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
     origin, one_plus_z, visible = map_of(scene, physics).look_up(mirrored)
     turned = origin @ physics.reference_render.rotation_matrix(ROTATION).T
     expected = physics.reference_render.sample_environment(environment_pixels(), turned)
-    expected *= physics.colour.redshift_gain(one_plus_z, 1.0, 1.0, physics.colour.DEFAULT_TEMPERATURE)
+    expected *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
     expected[~visible] = 0.0
     found = differences(lensed, expected.reshape(*SIZE[::-1], 3), (np.abs(turned[:, 2]) < 0.98).reshape(SIZE[::-1]))
     assert np.quantile(found, 0.98) < 1e-3

@@ -6,7 +6,7 @@ import pytest
 from pages import PAGES, ROOT, blocks, languages
 from shell_lines import check, commands
 
-from physics.exr import write_exr
+from physics.images.exr import write_exr
 
 SIZE = (64, 36)
 # Directives of the manual, and plain text.

@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 import physics
-from physics import exr, read_warp_map, reference_render
+from physics import read_warp_map
+from physics.images import exr
+from physics.reference import reference_render
 
 BLEND_FILES = Path(__file__).resolve().parents[2] / "blend_files"
 SIZE = (160, 90)
@@ -82,14 +84,14 @@ def rendered(composed: object, addon_module: Callable[[str], ModuleType], tmp_pa
     scene.frame_set(FRAME)
     picture = _render(scene, tmp_path / "picture.exr")
     (map_path,) = (tmp_path / "maps").glob("*.exr")
-    tree = addon_module("compositor_tree").find_setup(scene).tree
-    group = addon_module("compositor_tree").find_setup(scene).group
+    tree = addon_module("outputs.shared.compositor_tree").find_setup(scene).tree
+    group = addon_module("outputs.shared.compositor_tree").find_setup(scene).group
     inputs = {each.name: each for each in group.inputs}
     layers = inputs["Render"].links[0].from_socket
     for link in list(group.outputs["Image"].links):
         tree.links.new(layers, link.to_socket)
     foreground = _render(scene, tmp_path / "foreground.exr")
-    sky = addon_module("environment").read(scene)
+    sky = addon_module("scene.environment").read(scene)
     rotation = sky.rotation if sky.rotation_path else tuple(inputs["Environment Rotation"].default_value)
     reference = reference_render.render(
         read_warp_map(map_path),
@@ -149,7 +151,7 @@ def test_hole_and_objects_are_both_in_the_picture(rendered: Rendered) -> None:
 
 @pytest.mark.parametrize("scene", [*COMPOSED, *LENSED, *WITH_DISK], indirect=True)
 def test_camera_moves_for_two_seconds_and_more(scene: object, addon_module: Callable[[str], ModuleType]) -> None:
-    read_at = addon_module("shot").read_at
+    read_at = addon_module("scene.frame_setup").read_at
     frames = range(scene.frame_start, scene.frame_end + 1, 6)
     assert scene.frame_end - scene.frame_start + 1 >= 48
     places = np.array([read_at(scene, frame).parameters.camera_position for frame in frames])
@@ -204,8 +206,8 @@ def seen_objects(scene: object, addon_module: Callable[[str], ModuleType]) -> tu
     """Per pixel the pass index of the object that the ray of its centre meets, 0 for none; and where there is sky."""
     import bpy
 
-    frame = addon_module("shot").read_at(scene, FRAME)
-    exits = addon_module("_physics").exit_map.bake_exit_map(replace(frame.parameters, interpolation=0.0))
+    frame = addon_module("scene.frame_setup").read_at(scene, FRAME)
+    exits = addon_module("core.physics_api").exit_map.bake_exit_map(replace(frame.parameters, interpolation=0.0))
     scene.frame_set(FRAME)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = np.array(frame.parameters.camera_position)
@@ -294,7 +296,9 @@ def test_lensed_frame_has_a_black_shadow_and_light_around(
 
 def physics_parameters(scene: object, addon_module: Callable[[str], ModuleType]) -> physics.WarpMapParameters:
     """The frame's parameters, for this checkout's own physics."""
-    return physics.WarpMapParameters.from_metadata(addon_module("shot").read_at(scene, FRAME).parameters.to_metadata())
+    return physics.WarpMapParameters.from_metadata(
+        addon_module("scene.frame_setup").read_at(scene, FRAME).parameters.to_metadata()
+    )
 
 
 def test_nothing_stands_where_the_lens_does_not_show_it(
@@ -303,7 +307,7 @@ def test_nothing_stands_where_the_lens_does_not_show_it(
     import bpy
 
     for number in range(lensed.frame_start, lensed.frame_end + 1, 12):
-        frame = addon_module("shot").read_at(lensed, number)
+        frame = addon_module("scene.frame_setup").read_at(lensed, number)
         lensed.frame_set(number)
-        found = addon_module("lens_objects").place(lensed, bpy.context.evaluated_depsgraph_get(), frame)
+        found = addon_module("outputs.lens.lens_objects").place(lensed, bpy.context.evaluated_depsgraph_get(), frame)
         assert found.inside == found.nearer == ()

@@ -132,7 +132,7 @@ def test_never_uses_the_network(sources: dict[str, ast.Module]) -> None:
 def test_imports_only_what_blender_or_the_zip_brings(sources: dict[str, ast.Module]) -> None:
     brought = {"bpy", "mathutils", "numpy", "OpenEXR"}
     # In a checkout the add-on finds the physics beside it, under its plain name, and in one place only.
-    extra = {"_physics.py": {"physics"}}
+    extra = {"core/physics_api.py": {"physics"}}
     # Blender's own Python modules, part of every Blender.
     blender = {"_cycles", "addon_utils", "bl_ui", "bpy_extras", "gpu", "blf", "bmesh"}
     for name, tree in sources.items():

@@ -25,12 +25,12 @@ from physics import (
     write_disk_pass,
     write_warp_map,
 )
-from physics.accuracy import VISIBILITY_TOLERANCE, check_accuracy
-from physics.accuracy_samples import choose
-from physics.exit_map import bake_exit_map
-from physics.exit_map_file import write_exit_map
-from physics.sphere import spherical_triad, unit_vectors
-from physics.tracer import drain
+from physics.accuracy_check.accuracy import VISIBILITY_TOLERANCE, check_accuracy
+from physics.accuracy_check.accuracy_samples import choose
+from physics.files.exit_map_file import write_exit_map
+from physics.geodesics.tracer import drain
+from physics.maps.exit_map import bake_exit_map
+from physics.numerics.sphere import spherical_triad, unit_vectors
 
 ROOT = Path(__file__).parents[2]
 

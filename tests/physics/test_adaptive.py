@@ -9,7 +9,7 @@ from references import angle_between, unit_vectors
 from shots import AWAY, shot
 
 from physics import PanoramaCamera, PerspectiveCamera, bake
-from physics.tiles import Tiles, interpolate, sample, tiles_of
+from physics.sampling.tiles import Tiles, interpolate, sample, tiles_of
 
 SHOTS = {
     "orbit": shot(400, 225),

@@ -35,16 +35,16 @@ from physics import (
     ImageFileError,
     WarpMapError,
     bake,
-    exr,
-    map_file,
     read_disk_pass,
     read_warp_map,
     write_disk_pass,
     write_warp_map,
 )
-from physics.exit_map import bake_exit_map
-from physics.exit_map_file import read_exit_map, write_exit_map
-from physics.exr import read_exr, read_exr_header
+from physics.files import map_file
+from physics.files.exit_map_file import read_exit_map, write_exit_map
+from physics.images import exr
+from physics.images.exr import read_exr, read_exr_header
+from physics.maps.exit_map import bake_exit_map
 
 HERE = Path(__file__).parent
 
@@ -152,7 +152,7 @@ import random, sys
 from pathlib import Path
 from exr_files import every_kind, spoiled
 from physics import BlackHoleError
-from physics.exr import read_exr, read_exr_header
+from physics.images.exr import read_exr, read_exr_header
 
 folder = Path(sys.argv[1])
 kinds = list(every_kind(folder).values())

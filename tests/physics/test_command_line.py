@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from physics import read_warp_map
-from physics.exr import read_exr, write_exr
-from physics.png import srgb_from_linear
+from physics.images.exr import read_exr, write_exr
+from physics.images.png import srgb_from_linear
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,10 +9,11 @@ import pytest
 from shots import shot
 
 from physics import BlackHoleError, Disk, Observer, bake, trace_disk
-from physics.disk_flux import page_thorne_flux, peak_radius, relative_flux
-from physics.disk_look import PRESETS, DiskLook, emission, shade
-from physics.disk_render import disk_layers, over_sky
-from physics.disk_texture import (
+from physics.kerr.metric import isco_radius
+from physics.kerr.orbiting_matter import circular_constants, orbital_frequency
+from physics.light.disk_flux import page_thorne_flux, peak_radius, relative_flux
+from physics.light.disk_look import PRESETS, DiskLook, emission, shade
+from physics.light.disk_texture import (
     SHEAR_TURNS,
     disk_texture,
     look_up,
@@ -20,8 +21,7 @@ from physics.disk_texture import (
     pattern_period,
     pattern_shares,
 )
-from physics.metric import isco_radius
-from physics.orbiting_matter import circular_constants, orbital_frequency
+from physics.reference.disk_render import disk_layers, over_sky
 
 FAR = 1e6
 TEXTURE = disk_texture(width=256, height=64)

@@ -21,10 +21,10 @@ from physics import (
     write_disk_pass,
     write_warp_map,
 )
-from physics.annulus import share_above
-from physics.disk_samples import PIXEL_ERROR
-from physics.radial_path import winding
-from physics.view import View
+from physics.disk_passes.annulus import share_above
+from physics.disk_passes.disk_samples import PIXEL_ERROR
+from physics.geodesics.radial_path import winding
+from physics.sampling.view import View
 
 DISK = Disk()
 SHOTS = {

@@ -8,11 +8,11 @@ import pytest
 from references import random_sky, reference_cameras
 
 from physics import BlackHoleError, Cancelled, Fate, Observer, trace_disk, trace_rays
-from physics.crossings import cross_plane
-from physics.metric import horizon_radius, isco_radius
-from physics.orbiting_matter import circular_constants, orbital_frequency, redshift_factor
-from physics.rays import rays_from_triad
-from physics.trapped import around_hole
+from physics.geodesics.crossings import cross_plane
+from physics.kerr.critical_curve import around_hole
+from physics.kerr.metric import horizon_radius, isco_radius
+from physics.kerr.orbiting_matter import circular_constants, orbital_frequency, redshift_factor
+from physics.kerr.rays import rays_from_triad
 
 REFERENCES = {camera.name: camera for camera in reference_cameras("reference_disk.npz")}
 

@@ -10,12 +10,12 @@ from references import random_sky, reference_cameras, unit_vectors
 from shots import shot
 
 from physics import BlackHoleError, Observer, WarpMapError, bake, write_warp_map
-from physics.exit_lines import exit_lines
-from physics.exit_map import BILINEAR_TOLERANCE, IMPACT_SCALE, bake_exit_map
-from physics.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
-from physics.rays import camera_directions, rays_from_camera
-from physics.tracer import Fate
-from physics.trapped import find_barrier
+from physics.files.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
+from physics.geodesics.exit_lines import exit_lines
+from physics.geodesics.tracer import Fate
+from physics.kerr.critical_curve import find_barrier
+from physics.kerr.rays import camera_directions, rays_from_camera
+from physics.maps.exit_map import BILINEAR_TOLERANCE, IMPACT_SCALE, bake_exit_map
 
 
 def rays_of(spin, observer, count=500):

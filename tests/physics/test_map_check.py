@@ -7,15 +7,23 @@ import numpy as np
 import pytest
 from test_command_line import run
 
-from physics import Disk, PerspectiveCamera, WarpMapParameters, bake, read_disk_pass, write_disk_pass, write_warp_map
-from physics.disk_pass_file import FORMAT as DISK_PASS
-from physics.exit_map import bake_exit_map
-from physics.exit_map_file import FORMAT as EXIT_MAP
-from physics.exit_map_file import write_exit_map
-from physics.exr import read_exr, target_of, write_exr
-from physics.map_check import State, check_map
-from physics.map_file import ATTRIBUTE_FORMAT
-from physics.warp_map_file import FORMAT as WARP_MAP
+from physics import (
+    Disk,
+    PerspectiveCamera,
+    WarpMapParameters,
+    bake,
+    read_disk_pass,
+    write_disk_pass,
+    write_warp_map,
+)
+from physics.files.disk_pass_file import FORMAT as DISK_PASS
+from physics.files.exit_map_file import FORMAT as EXIT_MAP
+from physics.files.exit_map_file import write_exit_map
+from physics.files.map_check import State, check_map
+from physics.files.map_file import ATTRIBUTE_FORMAT
+from physics.files.warp_map_file import FORMAT as WARP_MAP
+from physics.images.exr import read_exr, target_of, write_exr
+from physics.maps.exit_map import bake_exit_map
 
 PARAMETERS = WarpMapParameters(
     spin=0.9,

@@ -8,10 +8,10 @@ import pytest
 from references import angle_between, random_sky, unit_vectors
 
 from physics import METHODS, Fate, Observer, trace_rays
-from physics.metric import horizon_radius
-from physics.polar import PolarMotion
-from physics.quadrature import NODE_COUNTS, RULES
-from physics.rays import camera_directions, rays_from_camera
+from physics.geodesics.polar import PolarMotion
+from physics.geodesics.quadrature import NODE_COUNTS, RULES
+from physics.kerr.metric import horizon_radius
+from physics.kerr.rays import camera_directions, rays_from_camera
 
 CAMERAS = {
     "orbit": (0.999, Observer.circular_orbit(0.999, 10.0)),

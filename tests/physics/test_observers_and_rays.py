@@ -8,8 +8,8 @@ import pytest
 from references import angle_between, random_sky, unit_vectors
 
 from physics import BlackHoleError, Fate, Observer, UnstableOrbitWarning, trace_rays
-from physics.metric import ergosphere_radius, horizon_radius, metric_functions
-from physics.rays import camera_directions, camera_triad, rays_from_camera
+from physics.kerr.metric import ergosphere_radius, horizon_radius, metric_functions
+from physics.kerr.rays import camera_directions, camera_triad, rays_from_camera
 
 PLACES = [(0.9, 5.0, 1.0), (0.998, 1.5, 0.3), (0.0, 3.0, 2.0), (-0.5, 20.0, 1.5)]
 

@@ -22,13 +22,13 @@ from physics import (
     trace_disk,
     trace_rays,
 )
-from physics.colour import redshift_gain
-from physics.disk_look import DiskLook, shade
-from physics.disk_texture import disk_texture
-from physics.metric import check_spin, ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
-from physics.rays import rays_from_triad
-from physics.sphere import celestial_coordinates, spherical_triad
-from physics.tracer import trace_block
+from physics.geodesics.tracer import trace_block
+from physics.kerr.metric import check_spin, ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
+from physics.kerr.rays import rays_from_triad
+from physics.light.color import redshift_gain
+from physics.light.disk_look import DiskLook, shade
+from physics.light.disk_texture import disk_texture
+from physics.numerics.sphere import celestial_coordinates, spherical_triad
 
 EVERY_TIME = {"derandomize": True, "database": None, "deadline": None, "suppress_health_check": list(HealthCheck)}
 many = settings(max_examples=150, **EVERY_TIME)

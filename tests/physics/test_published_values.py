@@ -8,8 +8,8 @@ import pytest
 from references import PUBLISHED, angle_between, bisect, unit_vectors
 
 from physics import Fate, Observer, trace_rays
-from physics.metric import horizon_radius, isco_radius, photon_orbit_radius
-from physics.trapped import trapped_carter_constant, trapped_impact_parameters, trapped_orbit
+from physics.kerr.critical_curve import trapped_carter_constant, trapped_impact_parameters, trapped_orbit
+from physics.kerr.metric import horizon_radius, isco_radius, photon_orbit_radius
 
 EQUATOR = math.pi / 2
 

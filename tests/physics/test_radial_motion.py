@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from physics import Observer, trace_disk
-from physics.metric import horizon_radius
-from physics.polar import PolarMotion
-from physics.quadrature import negative_root
-from physics.radial_motion import TIGHTEST, places_of_rays
-from physics.radial_path import places_of_rays as places_by_series
-from physics.radial_path import winding
-from physics.rays import rays_from_triad
-from physics.trapped import around_hole, edge_angles, find_barrier
+from physics.geodesics.polar import PolarMotion
+from physics.geodesics.quadrature import negative_root
+from physics.geodesics.radial_motion import TIGHTEST, places_of_rays
+from physics.geodesics.radial_path import places_of_rays as places_by_series
+from physics.geodesics.radial_path import winding
+from physics.kerr.critical_curve import around_hole, edge_angles, find_barrier
+from physics.kerr.metric import horizon_radius
+from physics.kerr.rays import rays_from_triad
 
 CROSSINGS = 4
 

@@ -10,14 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from physics.colour import redshift_gain
-from physics.reference_render import (
-    render,
-    resize,
-    rotation_matrix,
-    sample_environment,
-)
-from physics.sphere import unit_vectors
+from physics.light.color import redshift_gain
+from physics.numerics.sphere import unit_vectors
+from physics.reference.reference_render import render, resize, rotation_matrix, sample_environment
 
 FloatArray = NDArray[np.float64]
 

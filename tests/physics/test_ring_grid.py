@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from physics.ring_grid import between, continuous
+from physics.disk_passes.ring_grid import between, continuous
 
 ANGLES, COLUMNS = 128, 21
 

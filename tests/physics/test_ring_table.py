@@ -9,17 +9,17 @@ import pytest
 from shots import shot
 
 from physics import Disk, Observer, PanoramaCamera, bake
-from physics.crossings import cross_plane
-from physics.disk_samples import PIXEL_ERROR, PLACE_ERROR
-from physics.mino import radial_polynomial
-from physics.polar import PolarMotion
-from physics.radial_path import winding
-from physics.rays import rays_from_triad
-from physics.ring_grid import Needs
-from physics.ring_tracing import ring_tables
-from physics.sky_table import position_angles
-from physics.sphere import unit_vectors
-from physics.view import View
+from physics.disk_passes.disk_samples import PIXEL_ERROR, PLACE_ERROR
+from physics.disk_passes.ring_grid import Needs
+from physics.disk_passes.ring_tracing import ring_tables
+from physics.geodesics.crossings import cross_plane
+from physics.geodesics.mino import radial_polynomial
+from physics.geodesics.polar import PolarMotion
+from physics.geodesics.radial_path import winding
+from physics.kerr.rays import rays_from_triad
+from physics.maps.sky_table import position_angles
+from physics.numerics.sphere import unit_vectors
+from physics.sampling.view import View
 
 CAMERAS = {
     "slow spin from afar": {"spin": 0.6, "radius": 48.0, "fov": 42.0},
@@ -84,7 +84,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
 def test_tables_save_rays_and_leave_the_picture_as_it_is(monkeypatch):
     parameters = dataclasses.replace(shot(960, 540, spin=0.9, radius=20.0, fov=40.0), disk=Disk())
     with_tables = bake(parameters)
-    monkeypatch.setattr("physics.disk_samples.LEAST_SHADOW", math.inf)
+    monkeypatch.setattr("physics.disk_passes.disk_samples.LEAST_SHADOW", math.inf)
     without = bake(parameters)
     assert with_tables.counts["disk_rays"] < 0.8 * without.counts["disk_rays"]
     for order, (one, other) in enumerate(zip(with_tables.disk_passes, without.disk_passes, strict=True)):

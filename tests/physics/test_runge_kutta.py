@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from references import angle_between, random_sky, unit_vectors
 
-from physics import BlackHoleError, Cancelled, Fate, Observer, trace_rays, tracer
-from physics.runge_kutta import CASH_KARP, Tableau, integrate
+from physics import BlackHoleError, Cancelled, Fate, Observer, trace_rays
+from physics.geodesics import tracer
+from physics.numerics.runge_kutta import CASH_KARP, Tableau, integrate
 
 
 def order_conditions(tableau, weights):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from physics import BlackHoleError
-from physics.milky_way import galactic_axes, unresolved_glow
-from physics.star_colour import LUMINANCE_WEIGHTS, black_body_colour, temperature_from_colour_index
-from physics.star_sky import (
+from physics.light.milky_way import galactic_axes, unresolved_glow
+from physics.light.star_color import LUMINANCE_WEIGHTS, black_body_colour, temperature_from_colour_index
+from physics.light.star_sky import (
     ZERO_MAGNITUDE,
     Stars,
     draw_stars,

@@ -8,9 +8,7 @@ import pytest
 from references import random_sky
 
 from physics import BlackHoleError, Observer
-from physics.metric import horizon_radius
-from physics.rays import camera_directions, rays_from_camera
-from physics.trapped import (
+from physics.kerr.critical_curve import (
     comes_from_sky,
     edge_angles,
     edge_function,
@@ -19,6 +17,8 @@ from physics.trapped import (
     trapped_orbit,
     trapped_radii,
 )
+from physics.kerr.metric import horizon_radius
+from physics.kerr.rays import camera_directions, rays_from_camera
 
 CAMERAS = [
     (0.0, Observer.fido(10.0, 1.2, 0.0)),

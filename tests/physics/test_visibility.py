@@ -8,10 +8,10 @@ import pytest
 from shots import AWAY, shot
 
 from physics import PanoramaCamera, PerspectiveCamera, bake
-from physics.rays import rays_from_triad
-from physics.sphere import spherical_triad
-from physics.trapped import comes_from_sky
-from physics.visibility import near_edge, refine
+from physics.kerr.critical_curve import comes_from_sky
+from physics.kerr.rays import rays_from_triad
+from physics.numerics.sphere import spherical_triad
+from physics.sampling.visibility import near_edge, refine
 
 
 def brute_force_visibility(parameters, rows, columns, samples):

@@ -20,10 +20,10 @@ from physics import (
     bake,
     bake_steps,
     looking_at_hole,
-    painting,
     trace_rays,
     unstable_orbit_warning,
 )
+from physics.maps import painting
 
 
 def test_pixels_are_the_rays_of_their_centres():

@@ -16,12 +16,12 @@ from physics import (
     WarpMapError,
     WarpMapParameters,
     bake,
-    map_file,
     read_warp_map,
     read_warp_map_metadata,
     write_warp_map,
 )
-from physics.exr import read_exr, read_exr_header, write_exr
+from physics.files import map_file
+from physics.images.exr import read_exr, read_exr_header, write_exr
 
 PLANES = ("theta", "phi", "one_plus_z", "visibility")
 
@@ -194,7 +194,7 @@ def test_a_full_disk_is_said(baked):
     """/dev/full takes no byte: the writer's own failure, where the system has such a device."""
     if not Path("/dev/full").exists():
         pytest.skip("this system has no /dev/full")
-    from physics import exr
+    from physics.images import exr
 
     class Full:
         def __enter__(self):

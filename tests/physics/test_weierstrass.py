@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from physics.weierstrass import QuarticMotion, Weierstrass
+from physics.numerics.weierstrass import QuarticMotion, Weierstrass
 
 
 def columns(*values):

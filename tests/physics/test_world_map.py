@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from physics import Observer, PanoramaCamera, WarpMapError, WarpMapParameters
-from physics.exr import write_channels
-from physics.rays import rays_from_axes
-from physics.sphere import spherical_triad
-from physics.tracer import Fate, trace_block
-from physics.trapped import around_hole, edge_function, rays_from_triad
-from physics.world_map import FINAL, HEADER_PARTS, PREVIEW, WorldMap, world_map_steps, world_parameters
-from physics.world_map_file import read_world_map, read_world_map_metadata, write_world_map
+from physics.files.world_map_file import read_world_map, read_world_map_metadata, write_world_map
+from physics.geodesics.tracer import Fate, trace_block
+from physics.images.exr import write_channels
+from physics.kerr.critical_curve import around_hole, edge_function, rays_from_triad
+from physics.kerr.rays import rays_from_axes
+from physics.maps.world_map import FINAL, HEADER_PARTS, PREVIEW, WorldMap, world_map_steps, world_parameters
+from physics.numerics.sphere import spherical_triad
 
 PLACES = [
     (0.9, (30.0, 0.0, 5.0), "fido", (0.0, 0.0, 0.0)),

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A copy of the .blend file that renders each of its frames alike in a Blender without this add-on.
+
+Maps are image sequences and need no copy. What the add-on itself carries into each frame does: the parameters of the
+lens, and the disk's settings where they are animated. The copy has them as keyframes, one a frame. In the copy the lens
+traces its rays itself (as with Rays: No Bake), because the name of an exit map cannot be a keyframe.
+"""
+
+from collections import defaultdict
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+import bpy
+
+from ..core.errors import SceneError
+from ..core.physics_api import physics
+from ..outputs.lens import foreground, lens_camera, lens_shader, lens_sync
+from ..outputs.shared import disk_light
+from ..scene import frame_setup
+from ..settings.properties import IN_SHADER
+from ..ui.operators import TIMER_INTERVAL, reporting
+
+SUFFIX = "_farm"
+# On the scene, in the copy: the first and last frame that have keyframes. `farm/umbra_farm.py` reads it.
+FRAMES = "umbra_farm_frames"
+
+# What is animated (a datablock, a path in it and an index), and its values by frame.
+Track = tuple[bpy.types.ID, str, int]
+Tracks = dict[Track, dict[int, float]]
+
+_ADDON = "umbra."  # the paths of this add-on's settings begin so
+
+
+def path_beside(blend: Path) -> Path:
+    """Where the copy of a file lies: beside it, so that relative paths hold."""
+    return blend.with_name(f"{blend.stem}{SUFFIX}.blend")
+
+
+def _every_frame(scene: bpy.types.Scene) -> range:
+    """The scene's frames, those between steps too: a farm's chunks have no steps."""
+    return range(scene.frame_start, scene.frame_end + 1)
+
+
+def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
+    """Write the copy for some frames; the open file stays as it is.
+
+    A generator that yields the share of the work that is done, with the scene at some frame, and returns where the copy
+    is. Nothing else may change the file meanwhile. Closing it cancels the work.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        The file is not saved yet, a frame cannot be rendered, or a driver cannot be written as keyframes.
+    """
+    if not bpy.data.filepath:
+        raise SceneError("This file is not saved yet: save it, then save its farm copy.")
+    hole = frame_setup.active_hole(scene)
+    if disk_light.find(hole) is not None and _has_animated_settings(hole):
+        raise SceneError(
+            f'The disk of "{hole.name}" lights the scene, and its settings are animated, which a mesh cannot follow '
+            "without the add-on: switch Light the Scene off, or render with the add-on."
+        )
+    path = path_beside(Path(bpy.data.filepath))
+    if FRAMES in scene:
+        raise SceneError("This file is a farm copy already: open the file that it was made from.")
+    drivers = list(_drivers_of_settings())
+    tracks, lenses = yield from _read(scene, frames, drivers)
+    with _written(scene, frames, tracks, lenses, drivers):
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
+        except RuntimeError as error:
+            raise SceneError(f"The farm copy {path} cannot be written ({str(error).strip()}).") from error
+    return path
+
+
+def needs_copy(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's frames would be wrong without the add-on, but for those of such a copy."""
+    if FRAMES in scene:
+        return False
+    return any(map(lens_camera.is_lens, lens_camera.cameras_of(scene))) or any(True for _each in _drivers_of_settings())
+
+
+# --- reading --------------------------------------------------------------------------------------
+
+
+def _read(
+    scene: bpy.types.Scene, frames: range, drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]]
+) -> Generator[float, None, tuple[Tracks, dict[bpy.types.Camera, dict[str, object]]]]:
+    """All values by frame, and the parameters of each camera with a lens at the first of its frames."""
+    tracks: Tracks = defaultdict(dict)
+    lenses: dict[bpy.types.Camera, dict[str, object]] = {}
+    layer = next((each for each in scene.view_layers if each.use), scene.view_layers[0])
+    current = scene.frame_current
+    try:
+        for done, frame in enumerate(frames if drivers or lens_sync.is_on(scene) else ()):
+            yield done / len(frames)
+            scene.frame_set(frame)
+            for owner, curve in drivers:
+                tracks[owner, curve.data_path, curve.array_index][frame] = _source_value(owner, curve)
+            if lens_sync.is_on(scene):
+                camera = lens_sync.camera_of(scene)
+                values = lens_sync.values_of(scene, frame_setup.read(scene, layer.depsgraph))
+                lenses.setdefault(camera, values)
+                _read_lens(scene, frame, values, tracks)
+    finally:
+        scene.frame_set(current)
+    return {track: values for track, values in tracks.items() if len(set(values.values())) > 1}, lenses
+
+
+def _read_lens(scene: bpy.types.Scene, frame: int, parameters: dict[str, object], tracks: Tracks) -> None:
+    """The lens of a frame; the plain camera of the foreground follows it."""
+    camera = scene.camera.data
+    for name, value in parameters.items():
+        for index, number in enumerate(value if isinstance(value, tuple) else (value,)):
+            tracks[camera, f'cycles_custom["{name}"]', index][frame] = number
+    if scene.umbra.foreground_scene is None:
+        return
+    plain = scene.umbra.foreground_scene.camera.data
+    for prefix, owner, names in (
+        ("", camera, foreground.CAMERA_SETTINGS),
+        ("dof.", camera.dof, foreground.DEPTH_OF_FIELD),
+    ):
+        for name in names:
+            value = getattr(owner, name)
+            if isinstance(value, float):
+                tracks[plain, prefix + name, 0][frame] = value
+
+
+def _drivers_of_settings() -> Iterator[tuple[bpy.types.ID, bpy.types.FCurve]]:
+    """The drivers that read this add-on's settings, and what they belong to."""
+    for group in bpy.data.bl_rna.properties:
+        if group.type != "COLLECTION":
+            continue
+        for block in getattr(bpy.data, group.identifier):
+            for owner in (block, getattr(block, "node_tree", None)):
+                animation = getattr(owner, "animation_data", None)
+                for curve in animation.drivers if animation is not None else ():
+                    targets = [target for each in curve.driver.variables for target in each.targets]
+                    if any(target.data_path.startswith(_ADDON) for target in targets):
+                        yield owner, curve
+
+
+def _has_animated_settings(hole: bpy.types.Object) -> bool:
+    animation = hole.animation_data
+    if animation is None:
+        return False
+    bags = [] if animation.action is None else _channelbags(animation.action)
+    curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
+    return any(curve.data_path.startswith(_ADDON) for curve in curves)
+
+
+def _channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
+    return [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+
+
+def _source_value(owner: bpy.types.ID, curve: bpy.types.FCurve) -> float:
+    variables = curve.driver.variables
+    plain = curve.driver.type in {"SUM", "AVERAGE"} or curve.driver.expression.strip() == variables[0].name
+    if len(variables) != 1 or variables[0].type != "SINGLE_PROP" or not plain:
+        raise SceneError(
+            f'The driver of "{owner.name}", {curve.data_path}, works with settings of the black hole, which a Blender '
+            "without the add-on does not know: replace it by keyframes."
+        )
+    target = variables[0].targets[0]
+    return float(target.id.path_resolve(target.data_path))
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _written(
+    scene: bpy.types.Scene,
+    frames: range,
+    tracks: Tracks,
+    lenses: dict[bpy.types.Camera, dict[str, object]],
+    drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]],
+) -> Iterator[None]:
+    """Have all that in the open file while it is saved, and nothing of it afterwards."""
+    muted = [curve for _owner, curve in drivers if not curve.mute]
+    device = getattr(scene.render, "compositor_device", None)
+    rays = scene.umbra.lens_rays
+    made = []
+    try:
+        scene[FRAMES] = [frames[0], frames[-1]]
+        scene.umbra.lens_rays = IN_SHADER  # so that a machine with the add-on renders the same
+        if device is not None:
+            scene.render.compositor_device = "CPU"  # without a display there is usually no OpenGL
+        for curve in muted:
+            curve.mute = True
+        for camera, values in lenses.items():
+            lens_shader.write(camera, values)
+        for track, values in tracks.items():
+            made.append(_Curve(track, values))
+        yield
+    finally:
+        for curve in reversed(made):
+            curve.remove()
+        for curve in muted:
+            curve.mute = False
+        if device is not None:
+            scene.render.compositor_device = device
+        scene.umbra.lens_rays = rays
+        del scene[FRAMES]
+        if lenses:
+            lens_sync.show_live(scene)
+
+
+class _Curve:
+    """An animation curve with a keyframe a frame, held until the next, that can be taken out again."""
+
+    def __init__(self, track: Track, values: dict[int, float]) -> None:
+        self.owner, path, index = track
+        self.had_animation = self.owner.animation_data is not None
+        animation = self.owner.animation_data_create()
+        self.new_action = None
+        if animation.action is None:
+            animation.action = self.new_action = bpy.data.actions.new(f"Umbra Farm {self.owner.name}")
+        action = animation.action
+        self.curve = action.fcurve_ensure_for_datablock(self.owner, path, index=index)
+        if len(self.curve.keyframe_points):
+            raise SceneError(
+                f'"{self.owner.name}" has keyframes of its own on {path}, which the black hole writes: remove them.'
+            )
+        points = self.curve.keyframe_points
+        points.add(len(values))
+        points.foreach_set("co", [number for pair in values.items() for number in pair])
+        points.foreach_set("interpolation", [0] * len(values))  # constant
+        self.curve.update()
+
+    def remove(self) -> None:
+        """Take the curve out, and with it the action that was made for it."""
+        animation = self.owner.animation_data
+        if self.new_action is None:
+            for bag in _channelbags(animation.action):
+                if self.curve in bag.fcurves.values():
+                    bag.fcurves.remove(self.curve)
+            return
+        animation.action = None
+        bpy.data.actions.remove(self.new_action)
+        if not self.had_animation:
+            self.owner.animation_data_clear()
+
+
+# --- the operator --------------------------------------------------------------------------------
+
+
+class UMBRA_OT_save_farm_copy(bpy.types.Operator):
+    bl_idname = "umbra.save_farm_copy"
+    bl_label = "Save Farm Copy"
+    bl_description = (
+        "Save a copy beside this file whose frames render without this add-on, with what it does in each frame as "
+        "keyframes. Needed for the Cycles Lens and for a disk whose settings are animated"
+    )
+    bl_options = {"REGISTER"}
+
+    _steps: Generator[float, None, Path] | None = None
+    _timer: bpy.types.Timer | None = None
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        steps = save(scene, _every_frame(scene))
+        while self._go_on(steps) is None:
+            pass
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        manager = context.window_manager
+        self._steps = save(context.scene, _every_frame(context.scene))
+        manager.progress_begin(0.0, 1.0)
+        self._timer = manager.event_timer_add(TIMER_INTERVAL, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Take steps for a moment; other events than Esc are swallowed, so that the file stays as it is."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self.report({"INFO"}, "The farm copy was not written.")
+            return self._end(context, {"CANCELLED"})
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        until = perf_counter() + TIMER_INTERVAL
+        while perf_counter() < until:
+            try:
+                result = self._go_on(self._steps, context)
+            except physics.BlackHoleError as error:
+                self.report({"ERROR"}, str(error))
+                return self._end(context, {"CANCELLED"})
+            except Exception:
+                self._end(context, {"CANCELLED"})
+                raise
+            if result is not None:
+                return self._end(context, {"FINISHED"})
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._end(context, {"CANCELLED"})
+
+    def _go_on(self, steps: Generator[float, None, Path], context: bpy.types.Context | None = None) -> Path | None:
+        """Take a step, and say how far it is; the copy's path when it is done."""
+        try:
+            share = next(steps)
+        except StopIteration as end:
+            self.report({"INFO"}, f"Wrote {end.value.name}.")
+            return end.value
+        if context is not None:
+            context.window_manager.progress_update(share)
+            context.workspace.status_text_set(f"Saving the farm copy: {share:.0%} done.  Esc stops.")
+        return None
+
+    def _end(self, context: bpy.types.Context, result: set[str]) -> set[str]:
+        if self._steps is not None:
+            self._steps.close()
+            self._steps = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+        return result
+
+
+CLASSES = (UMBRA_OT_save_farm_copy,)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The compositor node group "Umbra Black Hole": its sockets, its version, and keeping it whole.
+
+What is outside must provide
+----------------------------
+Render
+    The render with a transparent film (`scene.render.film_transparent = True`), that is the Image output of
+    a Render Layers node: premultiplied, of the render's size. May be left unlinked: then there is sky only.
+Environment
+    An Image node with an equirectangular picture of any size, row by row as Blender shows it (zenith at the
+    top), in the colour space the file was made in (it is converted to scene-linear by Blender). Its alpha
+    is ignored. Unlinked the socket's own colour is the sky, the same in all directions: a World with a
+    plain background colour.
+Warp Map
+    An Image node with the baked EXR, a single image or a sequence. The image must be Non-Color
+    (`image.colorspace_settings.name`) and Channel Packed (`image.alpha_mode = "CHANNEL_PACKED"`). Its
+    size is the render's, or 2 or 4 times that. No other node may lie in between.
+Disk
+    The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. Unlinked there is none.
+Environment Rotation, Environment Strength
+    What the World's Mapping node (type Point) and its Background node say.
+
+The scene's compositor must work in full precision (`scene.render.compositor_precision = "FULL"`): half floats
+cannot hold texture coordinates. In background it must work on the CPU (`compositor_device = "CPU"`).
+
+Everything in here works on Blender's data alone, without operators or context.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.physics_api import color
+from . import black_hole_nodes
+from .builder import Socket, TreeBuilder
+from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+
+GROUP_NAME = "Umbra Black Hole"
+GROUP_VERSION = 2
+"""Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
+
+VERSION_KEY = "umbra_version"
+
+RENDER = SocketSpec(
+    "Render",
+    "NodeSocketColor",
+    "The rendered scene with a transparent film; it is laid over the sky",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
+ENVIRONMENT = SocketSpec(
+    "Environment",
+    "NodeSocketColor",
+    "Equirectangular picture of the sky, of any size, or one colour for all of the sky",
+    default=(0.0, 0.0, 0.0, 1.0),
+)
+WARP_MAP = SocketSpec(
+    "Warp Map",
+    "NodeSocketColor",
+    "The baked map of where the light comes from (Non-Color). Magenta in the picture means that it is "
+    "missing or is not a warp map",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
+ROTATION = SocketSpec(
+    "Environment Rotation",
+    "NodeSocketVector",
+    "Rotation of the sky, the same as in the Mapping node of the World",
+    default=(0.0, 0.0, 0.0),
+    subtype="EULER",
+)
+STRENGTH = SocketSpec(
+    "Environment Strength",
+    "NodeSocketFloat",
+    "Brightness factor of the sky, the same as the strength of the World's background",
+    default=1.0,
+    minimum=0.0,
+    maximum=1.0e6,
+)
+EXPOSURE = SocketSpec(
+    "Exposure",
+    "NodeSocketFloat",
+    "Brightens the sky by this many stops, without touching the rendered scene",
+    default=0.0,
+    minimum=-32.0,
+    maximum=32.0,
+)
+REDSHIFT_COLOUR = SocketSpec(
+    "Redshift Colour",
+    "NodeSocketFloat",
+    "How much the frequency shift changes the colour of the sky: 0 is off, 1 is physical",
+    default=1.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
+REDSHIFT_BRIGHTNESS = SocketSpec(
+    "Redshift Brightness",
+    "NodeSocketFloat",
+    "How much the frequency shift changes the brightness of the sky: 0 is off, 1 is physical, "
+    "(1 + z) to the power of -4",
+    default=1.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
+TEMPERATURE = SocketSpec(
+    "Sky Temperature",
+    "NodeSocketFloat",
+    "Colour temperature of the sky's light (kelvin) from which the shift of its colour is computed",
+    default=color.DEFAULT_TEMPERATURE,
+    minimum=1000.0,
+    maximum=40000.0,
+    subtype="COLOR_TEMPERATURE",
+)
+DISK = SocketSpec(
+    "Disk",
+    "NodeSocketColor",
+    "The accretion disk of the node group Umbra Disk, premultiplied: in front of the sky and behind the scene",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
+IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
+SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole, its disk and the sky without the scene", in_out="OUTPUT")
+SHADOW = SocketSpec(
+    "Shadow", "NodeSocketFloat", "Mask of the black hole's shadow: 1 inside, 0 outside", in_out="OUTPUT"
+)
+REDSHIFT = SocketSpec(
+    "Redshift",
+    "NodeSocketFloat",
+    "Frequency ratio 1 + z: above 1 is redshift, below 1 blueshift",
+    in_out="OUTPUT",
+)
+
+INPUTS = (
+    RENDER,
+    ENVIRONMENT,
+    WARP_MAP,
+    ROTATION,
+    STRENGTH,
+    EXPOSURE,
+    REDSHIFT_COLOUR,
+    REDSHIFT_BRIGHTNESS,
+    TEMPERATURE,
+    DISK,
+)
+OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
+
+
+def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+    inputs = black_hole_nodes.GroupInputs(
+        render=sockets[RENDER.name],
+        environment=sockets[ENVIRONMENT.name],
+        warp_map=sockets[WARP_MAP.name],
+        rotation=sockets[ROTATION.name],
+        strength=sockets[STRENGTH.name],
+        exposure=sockets[EXPOSURE.name],
+        redshift_colour=sockets[REDSHIFT_COLOUR.name],
+        redshift_brightness=sockets[REDSHIFT_BRIGHTNESS.name],
+        temperature=sockets[TEMPERATURE.name],
+        disk=sockets[DISK.name],
+    )
+    results = black_hole_nodes.build(builder, inputs)
+    return {
+        IMAGE.name: results.image,
+        SKY.name: results.sky,
+        SHADOW.name: results.shadow,
+        REDSHIFT.name: results.redshift,
+    }
+
+
+_GROUP = StampedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
+
+is_group = _GROUP.owns
+is_current = _GROUP.is_current
+find_group = _GROUP.find
+ensure_group = _GROUP.ensure
+add_group_node = _GROUP.add_node
+
+
+def group_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
+    """All group nodes in a compositor tree (not in groups inside of it) that use the group."""
+    return [node for node in tree.nodes if node.bl_idname == GROUP_NODE_TYPE and is_group(node.node_tree)]

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The compositor node groups "Umbra Disk": their sockets and their version.
+
+They draw a disk from the passes that were baked along with a warp map: for the input Disk of the group "Umbra Black
+Hole", or over the picture of a camera that bends its rays. Pass 1 and so on must be Image nodes with the baked EXRs,
+Non-Color and Channel Packed like the warp map; Colours is a table, and Texture is a picture with azimuth across and
+ln(radius) down, see `disk_images`.
+
+A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
+images, and for each way to use the texture; a file has those that it needs. Inside, each image is drawn by another
+group, "Umbra Disk Image".
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import bpy
+
+from ..core.physics_api import disk_look
+from . import disk_nodes
+from .builder import Socket, TreeBuilder
+from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+
+GROUP_NAME = "Umbra Disk"
+GROUP_VERSION = 2
+"""Raised whenever the groups' sockets or nodes change; groups with another number are rebuilt."""
+
+VERSION_KEY = "umbra_disk_version"
+"""Of the one group that there was in version 1; those of today have the kind behind it."""
+
+
+def _picture(name: str, description: str) -> SocketSpec:
+    return SocketSpec(name, "NodeSocketColor", description, default=(0.0, 0.0, 0.0, 0.0), hide_value=True)
+
+
+def _number(name: str, description: str, default: float, low: float = -1e6, high: float = 1e6) -> SocketSpec:
+    return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=low, maximum=high)
+
+
+def _factor(name: str, description: str, default: float) -> SocketSpec:
+    return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=0.0, maximum=1.0, subtype="FACTOR")
+
+
+BEHIND, COLOURS, TEXTURE = "Behind", "Colours", "Texture"
+OUTPUT, IMAGE = "Disk", "Image"
+PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
+
+_LOOK = disk_look.DiskLook()
+
+LOOK_SOCKETS = {
+    "temperature": "Temperature",
+    "doppler_colour": "Doppler Colour",
+    "doppler_brightness": "Doppler Brightness",
+    "colour_variation": "Colour Variation",
+    "falloff": "Falloff",
+    "exponent": "Falloff Power",
+    "exposure": "Disk Exposure",
+    "opacity": "Opacity",
+    "streaks": "Streaks",
+    "clumps": "Clumps",
+    "inner_softness": "Inner Softness",
+    "outer_softness": "Outer Softness",
+    "gain": "Contrast of Light",
+}
+"""Field of `DiskLook`, and property of the disk -> the socket that follows it."""
+
+BEAMING, PAGE_THORNE, PERIOD = "Beaming", "Page-Thorne", "Pattern Period"
+PHASE, FIRST_TURN, SECOND_TURN = "Pattern Phase", "First Turn", "Second Turn"
+SPIN, DIRECTION, INNER, OUTER = "Spin", "Direction", "Inner Edge", "Outer Edge"
+INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
+
+_BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
+_INPUTS = (
+    _picture(COLOURS, "Table of the colours of hot bodies (Non-Color)"),
+    _picture(
+        TEXTURE,
+        "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
+    ),
+    _number(PHASE, "How far the pattern of the streaks is through its life, 0 to 1", 0.0, 0.0, 1.0),
+    _number(FIRST_TURN, "Angle by which the first pattern is turned, radians", 0.0),
+    _number(SECOND_TURN, "Angle by which the second pattern is turned, radians", 0.0),
+    _number(PERIOD, "How long a pattern of the streaks lives, units of M", 100.0, 0.0),
+    _number(SPIN, "Spin of the hole, from 0 to 1", 0.9, -1.0, 1.0),
+    _number(DIRECTION, "The way that the disk turns: 1 or, against the hole, -1", 1.0, -1.0, 1.0),
+    _number(INNER, "Radius of the inner edge, units of M", 6.0, 0.0),
+    _number(OUTER, "Radius of the outer edge, units of M", 20.0, 0.0),
+    _number(INNERMOST, "Radius of the innermost stable orbit, units of M", 6.0, 0.0),
+    _number(FLUX_FACTOR, "By which Page and Thorne's flux becomes 1 where it is largest", 7000.0, 0.0),
+    _number(PAGE_THORNE, "1: the brightness follows Page and Thorne's flux, 0: a power of the radius", 1.0, 0.0, 1.0),
+    _number(LOOK_SOCKETS["exponent"], "Power of the radius by which the brightness falls", _LOOK.exponent, 0.0, 20.0),
+    SocketSpec(
+        LOOK_SOCKETS["temperature"],
+        "NodeSocketFloat",
+        "Temperature where the disk is brightest (kelvin)",
+        default=_LOOK.temperature,
+        minimum=disk_look.COLDEST,
+        maximum=disk_look.HOTTEST,
+        subtype="COLOR_TEMPERATURE",
+    ),
+    _factor(LOOK_SOCKETS["doppler_colour"], "How much the disk's motion changes its colour", _LOOK.doppler_colour),
+    _factor(
+        LOOK_SOCKETS["doppler_brightness"],
+        "How much the disk's motion changes its brightness",
+        _LOOK.doppler_brightness,
+    ),
+    _number(BEAMING, "Power of the frequency ratio in the brightness: 4, or 3 for one colour", 4.0, 3.0, 4.0),
+    _factor(LOOK_SOCKETS["colour_variation"], "How much cooler the dim parts are", _LOOK.colour_variation),
+    _factor(LOOK_SOCKETS["falloff"], "How far the brightness follows the profile", _LOOK.falloff),
+    _number(LOOK_SOCKETS["exposure"], "Brightens the disk by this many stops", _LOOK.exposure, -32.0, 32.0),
+    _factor(LOOK_SOCKETS["opacity"], "How much the densest parts hide what is behind", _LOOK.opacity),
+    _factor(LOOK_SOCKETS["streaks"], "How much the streaks thin the disk out", _LOOK.streaks),
+    _factor(LOOK_SOCKETS["clumps"], "How much the clumps thin the disk out", _LOOK.clumps),
+    _factor(
+        LOOK_SOCKETS["inner_softness"], "Share of the disk over which its inner edge fades in", _LOOK.inner_softness
+    ),
+    _factor(
+        LOOK_SOCKETS["outer_softness"], "Share of the disk over which its outer edge fades out", _LOOK.outer_softness
+    ),
+    _number(LOOK_SOCKETS["gain"], "How much brighter dense streaks are than thin ones", _LOOK.gain, 1.0, 8.0),
+)
+_OUTPUTS = (
+    SocketSpec(OUTPUT, "NodeSocketColor", "The disk, premultiplied, with its coverage as alpha", in_out="OUTPUT"),
+    SocketSpec(IMAGE, "NodeSocketColor", "The disk in front of what is behind", in_out="OUTPUT"),
+)
+
+
+def pass_names(images: int) -> tuple[str, ...]:
+    """Names of the sockets of so many passes."""
+    return tuple(f"Pass {number}" for number in range(1, images + 1))
+
+
+@cache
+def group_of(images: int, picture: bool = False) -> StampedGroup:
+    """The group for so many images of a disk, with streaks and clumps or with a picture on it; see `ensure`."""
+    kind = f"{images} Picture" if picture else f"{images}"
+    names = pass_names(images)
+    passes = tuple(
+        _picture(name, f"The baked pass of image {number} of the disk (Non-Color), 1 being in front")
+        for number, name in enumerate(names, start=1)
+    )
+
+    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+        inner = image_group(picture).ensure()
+        light: Socket | None = None
+        through: Socket | None = None
+        for name in names:
+            node = builder.node(GROUP_NODE_TYPE, name)
+            node.node_tree = inner
+            builder.feed(node.inputs[PASS], sockets[name])
+            for spec in _INPUTS:
+                builder.feed(node.inputs[spec.name], sockets[spec.name])
+            if light is not None:
+                builder.feed(node.inputs[LIGHT], light)
+                builder.feed(node.inputs[THROUGH], through)
+            light, through = node.outputs[LIGHT], node.outputs[THROUGH]
+        given = [sockets[name] for name in names]
+        disk, image = disk_nodes.build_whole(builder, given, sockets[BEHIND], light, through)
+        return {OUTPUT: disk, IMAGE: image}
+
+    key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
+    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
+
+
+@cache
+def image_group(picture: bool) -> StampedGroup:
+    """The group that draws one image of the disk."""
+    kind = "Image Picture" if picture else "Image"
+
+    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+        inputs = _disk_inputs(sockets)
+        light, through = disk_nodes.build_image(builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture)
+        return {LIGHT: light, THROUGH: through}
+
+    inputs = (
+        _picture(PASS, "The baked pass of the image"),
+        SocketSpec(LIGHT, "NodeSocketVector", "Light of the images in front", default=(0.0, 0.0, 0.0)),
+        SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that they leave", default=1.0),
+        *_INPUTS,
+    )
+    outputs = (
+        SocketSpec(LIGHT, "NodeSocketVector", "Light of this image and those in front", in_out="OUTPUT"),
+        SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that is left", in_out="OUTPUT"),
+    )
+    key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
+    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
+
+
+def ensure(images: int, picture: bool) -> bpy.types.NodeTree:
+    """The group for so many images, whole and of this version, and what is inside of it."""
+    image_group(picture).ensure()
+    return group_of(images, picture).ensure()
+
+
+def remove_unused() -> None:
+    """Remove those of the groups that nothing uses any more, and then those that were inside of them."""
+    for inside in (False, True):
+        for tree in list(bpy.data.node_groups):
+            is_inside = any(image_group(picture).owns(tree) for picture in (False, True))
+            if tree.users == 0 and tree.library is None and owns(tree) and is_inside == inside:
+                bpy.data.node_groups.remove(tree)
+
+
+def owns(tree: bpy.types.NodeTree | None) -> bool:
+    """Whether a node tree is one of these groups, of whatever kind and version."""
+    return tree is not None and any(key.startswith(VERSION_KEY) for key in tree.keys())  # noqa: SIM118
+
+
+def _disk_inputs(sockets: dict[str, Socket]) -> disk_nodes.DiskInputs:
+    return disk_nodes.DiskInputs(
+        disk_pass=sockets[PASS],
+        colours=sockets[COLOURS],
+        texture=sockets[TEXTURE],
+        phase=sockets[PHASE],
+        first_turn=sockets[FIRST_TURN],
+        second_turn=sockets[SECOND_TURN],
+        period=sockets[PERIOD],
+        spin=sockets[SPIN],
+        direction=sockets[DIRECTION],
+        inner=sockets[INNER],
+        outer=sockets[OUTER],
+        innermost=sockets[INNERMOST],
+        flux_factor=sockets[FLUX_FACTOR],
+        page_thorne=sockets[PAGE_THORNE],
+        beaming=sockets[BEAMING],
+        **{field: sockets[name] for field, name in LOOK_SOCKETS.items()},
+    )

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node groups that code builds, stamped with a version, and rebuilt wherever they are not what they should be."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bpy
+
+from .builder import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder
+
+BLENDER_KEY = "umbra_built_with_blender"
+CONTENT_KEY = "umbra_content"
+
+TREE_TYPE = "CompositorNodeTree"
+GROUP_NODE_TYPE = "CompositorNodeGroup"
+
+
+@dataclass(frozen=True)
+class SocketSpec:
+    """A socket of the group as the artist sees it."""
+
+    name: str
+    socket_type: str
+    description: str
+    in_out: str = "INPUT"
+    default: float | tuple[float, ...] | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    subtype: str = "NONE"
+    hide_value: bool = False
+
+
+@dataclass(frozen=True)
+class StampedGroup:
+    """A kind of node group, of which a file has one unless `ensure` is told which is meant.
+
+    `is_current` and `ensure` look into the group itself, so that a change by hand is found as well.
+    """
+
+    name: str
+    version: int
+    """Raised whenever the group's sockets or nodes change; groups with another number are rebuilt."""
+    version_key: str
+    """The group's custom property that holds its version, and tells it from other groups."""
+    inputs: tuple[SocketSpec, ...]
+    outputs: tuple[SocketSpec, ...]
+    build: Callable[[TreeBuilder, dict[str, Socket]], dict[str, Socket]]
+    """Adds all nodes between the group's inputs and outputs, both by name."""
+    former_names: dict[tuple[str, str], str] = field(default_factory=dict)
+    """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
+    tree_type: str = TREE_TYPE
+    node_type: str = GROUP_NODE_TYPE
+
+    def owns(self, tree: bpy.types.NodeTree | None) -> bool:
+        """Whether a node tree is this group, of whatever version, whole or damaged."""
+        return tree is not None and tree.bl_idname == self.tree_type and self.version_key in tree
+
+    def is_current(self, tree: bpy.types.NodeTree) -> bool:
+        """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
+        return (
+            tree.get(self.version_key) == self.version
+            and tree.get(BLENDER_KEY) == _blender_series()
+            and tree.get(CONTENT_KEY) == _fingerprint(tree)
+        )
+
+    def find(self) -> bpy.types.NodeTree | None:
+        """The group in this file, or None. One linked from another file is left out: it cannot be repaired."""
+        groups = [tree for tree in bpy.data.node_groups if self.owns(tree) and tree.library is None]
+        return next((tree for tree in groups if tree.name == self.name), groups[0] if groups else None)
+
+    def ensure(self, tree: bpy.types.NodeTree | None = None) -> bpy.types.NodeTree:
+        """The group, or the one that is given, whole and of this version.
+
+        Returns
+        -------
+        bpy.types.NodeTree
+            Built anew if the file has none. One of another version, from another version of Blender, or with
+            changes inside is rebuilt in place: group nodes that use it keep their values and links, as far as
+            their sockets still exist.
+        """
+        tree = tree or self.find()
+        if tree is None:
+            tree = bpy.data.node_groups.new(self.name, self.tree_type)
+        if not self.is_current(tree):
+            self._rebuild(tree)
+        return tree
+
+    def add_node(self, tree: bpy.types.NodeTree) -> bpy.types.Node:
+        """Add a group node that uses the group to a tree; `inputs` and `outputs` name its sockets."""
+        node = tree.nodes.new(self.node_type)
+        node.node_tree = self.ensure()
+        node.name = node.label = self.name
+        node.width = 220.0
+        return node
+
+    def _rebuild(self, tree: bpy.types.NodeTree) -> None:
+        tree.nodes.clear()
+        for spec in self._match_interface(tree):
+            _set_default_in_users(tree, spec)
+        builder = TreeBuilder(tree)
+        group_input = builder.node("NodeGroupInput")
+        sockets = {socket.name: socket for socket in group_input.outputs}
+        results = self.build(builder, {spec.name: sockets[spec.name] for spec in self.inputs})
+        group_output = builder.node("NodeGroupOutput")
+        targets = {socket.name: socket for socket in group_output.inputs}
+        for spec in self.outputs:
+            tree.links.new(results[spec.name], targets[spec.name])
+        tree[self.version_key] = self.version
+        tree[BLENDER_KEY] = _blender_series()
+        tree[CONTENT_KEY] = _fingerprint(tree)
+
+    def _match_interface(self, tree: bpy.types.NodeTree) -> list[SocketSpec]:
+        """Make the sockets what they should be, keeping those that exist: values and links hang on them.
+
+        Returns the inputs that did not exist before.
+        """
+        interface = tree.interface
+        wanted = {(spec.in_out, spec.name): spec for spec in (*self.outputs, *self.inputs)}
+        kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
+        for item in list(interface.items_tree):
+            if item.item_type == "SOCKET":
+                key = (item.in_out, self.former_names.get((item.in_out, item.name), item.name))
+                if key in wanted and key not in kept and item.socket_type == wanted[key].socket_type:
+                    kept[key] = item
+        survivors = set(kept.values())
+        for item in [item for item in interface.items_tree if item not in survivors]:
+            interface.remove(item)
+        added = []
+        for position, (key, spec) in enumerate(wanted.items()):
+            item = kept.get(key)
+            if item is None:
+                item = interface.new_socket(spec.name, in_out=spec.in_out, socket_type=spec.socket_type)
+                added.append(spec)
+            _describe(item, spec)
+            interface.move(item, position)
+        return [spec for spec in added if spec.in_out == "INPUT"]
+
+
+def _blender_series() -> str:
+    """Nodes are written differently by each series, and Blender converts old files upward only."""
+    return f"{bpy.app.version[0]}.{bpy.app.version[1]}"
+
+
+def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
+    """Give a new input its default in existing group nodes, where Blender made it before it had one."""
+    users = [*bpy.data.node_groups, *(world.node_tree for world in bpy.data.worlds if world.node_tree is not None)]
+    if not SETTINGS_ARE_SOCKETS:
+        users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
+    for user in users:
+        for node in user.nodes:
+            if getattr(node, "node_tree", None) == tree:
+                node.inputs[spec.name].default_value = spec.default
+
+
+def _describe(item: bpy.types.NodeTreeInterfaceSocket, spec: SocketSpec) -> None:
+    item.name = spec.name
+    item.description = spec.description
+    item.hide_value = spec.hide_value
+    if spec.socket_type != "NodeSocketColor" and item.subtype != spec.subtype:
+        item.subtype = spec.subtype
+    if spec.minimum is not None:
+        item.min_value = spec.minimum
+    if spec.maximum is not None:
+        item.max_value = spec.maximum
+    if spec.default is not None:
+        item.default_value = spec.default
+
+
+def _fingerprint(tree: bpy.types.NodeTree) -> str:
+    """Hash of all that decides what the group does; the places and names of nodes are left out."""
+    order = {node: index for index, node in enumerate(tree.nodes)}
+    lines = [_interface_line(item) for item in tree.interface.items_tree]
+    for node, index in order.items():
+        settings = [
+            f"{name}={getattr(node, name)}"
+            for name in sorted(property_.identifier for property_ in node.bl_rna.properties)
+            if name not in bpy.types.Node.bl_rna.properties and isinstance(getattr(node, name), str | bool)
+        ]
+        values = [_value_text(socket) for socket in node.inputs if not socket.is_linked]
+        lines.append(f"{index} {node.bl_idname} mute={node.mute} {settings} {values}")
+    lines.extend(
+        sorted(
+            f"{order[link.from_node]}:{link.from_socket.identifier}>{order[link.to_node]}:{link.to_socket.identifier}"
+            for link in tree.links
+        )
+    )
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def _interface_line(item: bpy.types.NodeTreeInterfaceItem) -> str:
+    if item.item_type != "SOCKET":
+        return item.item_type
+    details = [getattr(item, name, "") for name in ("description", "subtype", "min_value", "max_value", "hide_value")]
+    return f"{item.in_out} {item.name} {item.identifier} {item.socket_type} {details}"
+
+
+def _value_text(socket: bpy.types.NodeSocket) -> str:
+    value = getattr(socket, "default_value", None)
+    if value is None or isinstance(value, str | bool | int | float):
+        return f"{socket.identifier}={value!r}"
+    return f"{socket.identifier}={[float(component) for component in value]}"

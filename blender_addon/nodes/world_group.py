@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shader node group "Umbra World": its sockets, its version, and keeping it whole.
+
+Its Vector takes the place of Texture Coordinate > Generated in front of whatever makes the World's sky; its Tint
+multiplies, and its Fault is added to, the colour that comes out of it. Each lensed World has a group of its own,
+because the map is read inside of it.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from . import black_hole_group, world_nodes
+from .builder import Socket, TreeBuilder
+from .stamped_group import SocketSpec, StampedGroup
+
+GROUP_NAME = "Umbra World"
+GROUP_VERSION = 1
+VERSION_KEY = "umbra_world_version"
+
+LENSING = SocketSpec(
+    "Lensing",
+    "NodeSocketFloat",
+    "1 bends the sky's light around the hole, 0 shows the sky as it is",
+    default=1.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
+OTHER_RAYS = SocketSpec(
+    "Lensed Light",
+    "NodeSocketFloat",
+    "1: light and reflections come from the lensed sky, as it is at the camera's place. 0: only the camera sees it, "
+    "and the scene is lit by the plain sky",
+    default=1.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
+VECTOR = SocketSpec(
+    "Vector", "NodeSocketVector", "Where the light comes from: in place of Generated coordinates", in_out="OUTPUT"
+)
+TINT = SocketSpec(
+    "Tint", "NodeSocketVector", "What the sky's colour is multiplied by: redshift, exposure, shadow", in_out="OUTPUT"
+)
+FAULT = SocketSpec(
+    "Fault", "NodeSocketVector", "What is added to the sky's colour: magenta without a valid map", in_out="OUTPUT"
+)
+
+INPUTS = (
+    LENSING,
+    OTHER_RAYS,
+    black_hole_group.EXPOSURE,
+    black_hole_group.REDSHIFT_COLOUR,
+    black_hole_group.REDSHIFT_BRIGHTNESS,
+    black_hole_group.TEMPERATURE,
+)
+OUTPUTS = (VECTOR, TINT, FAULT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
+
+
+def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+    results = world_nodes.build(builder, world_nodes.WorldInputs(*(sockets[spec.name] for spec in INPUTS)))
+    return {
+        VECTOR.name: results.vector,
+        TINT.name: results.tint,
+        FAULT.name: results.fault,
+        black_hole_group.SHADOW.name: results.shadow,
+        black_hole_group.REDSHIFT.name: results.redshift,
+    }
+
+
+_GROUP = StampedGroup(
+    GROUP_NAME,
+    GROUP_VERSION,
+    VERSION_KEY,
+    INPUTS,
+    OUTPUTS,
+    _build,
+    tree_type="ShaderNodeTree",
+    node_type="ShaderNodeGroup",
+)
+
+is_group = _GROUP.owns
+is_current = _GROUP.is_current
+
+
+def new_group() -> bpy.types.NodeTree:
+    """A group of this kind, besides any that there are."""
+    return _GROUP.ensure(bpy.data.node_groups.new(GROUP_NAME, _GROUP.tree_type))
+
+
+def mend(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:
+    """A group, rebuilt in place unless it is whole and of this version; whether it reads a map is not kept."""
+    return _GROUP.ensure(tree)

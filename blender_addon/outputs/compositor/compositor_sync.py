@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carry a scene's settings into its compositor set-up: which maps are read, and which sky."""
+
+import bpy
+
+from ...bake import maps
+from ...core.errors import SceneError
+from ...nodes import black_hole_group
+from ...scene import environment, frame_setup
+from ..shared import disk_sync
+from ..shared.compositor_tree import Setup, find_setup, find_tree
+
+MAP_IMAGE_NAME = "Umbra Warp Map"
+# A file that never exists: a frame without a valid map is magenta instead of showing some older map.
+NO_MAP = "no_warp_map_0001.exr"
+
+ROTATION_SOCKET, STRENGTH_SOCKET = "Environment Rotation", "Environment Strength"
+
+
+def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
+    """Make the node group of an existing set-up whole and of this version; whether there was something to do.
+
+    Thorough: the group's inside is looked through as well, which takes up to a tenth of a second; else its sockets.
+    """
+    setup = find_setup(scene)
+    if setup is None or setup.tree.library is not None:
+        return False
+    tree = setup.group.node_tree
+    inputs, outputs = setup.group.inputs, setup.group.outputs
+    whole = black_hole_group.is_group(tree) and all(spec.name in inputs for spec in black_hole_group.INPUTS)
+    whole = whole and all(spec.name in outputs for spec in black_hole_group.OUTPUTS)
+    if whole and not (thorough and not black_hole_group.is_current(tree)):
+        return False
+    setup.group.node_tree = black_hole_group.ensure_group()
+    return True
+
+
+def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
+    """Carry the scene's settings into an existing set-up: which maps, which sky. Failures become notes."""
+    setup = find_setup(scene)
+    if setup is None:
+        return
+    repair(scene, thorough=False)
+    disk_sync.refresh(scene)
+    try:
+        point_at_maps(scene)
+    except SceneError as error:
+        if notes is not None:
+            notes.append(str(error))
+    try:
+        sync_sky(scene)
+    except SceneError as error:
+        if notes is not None:
+            notes.append(str(error))
+
+
+# Together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see maps.py.
+SEQUENCE_SETTINGS = {
+    "frame_duration": maps.SEQUENCE_LENGTH,
+    "frame_start": 0,
+    "frame_offset": -1,
+    "use_cyclic": True,
+    "use_auto_refresh": True,
+}
+
+
+def map_image(name: str) -> bpy.types.Image:
+    """An image datablock that reads maps, as yet none."""
+    image = bpy.data.images.new(name, 1, 1, float_buffer=True)
+    image.source = "SEQUENCE"
+    image.filepath = NO_MAP
+    image.colorspace_settings.name = "Non-Color"
+    image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
+    return image
+
+
+def point_at_maps(scene: bpy.types.Scene) -> None:
+    """Let the map node read the scene's maps of the current resolution.
+
+    Raises
+    ------
+    SceneError
+        There is no hole.
+    """
+    hole = frame_setup.active_hole(scene)
+    samples = int(scene.umbra.supersampling)
+    width, height = frame_setup.render_size(scene.render)
+    size = (width * samples, height * samples)
+    _set_map_path(scene, maps.blender_map_path(scene, hole.name, size, 1))
+
+
+def point_at_nothing(scene: bpy.types.Scene) -> None:
+    """Let the map node read no map at all: the picture is magenta until a valid map is in place."""
+    _set_map_path(scene, maps.folder(scene).blender_path + NO_MAP)
+
+
+def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
+    """Let the map node read the same files from another folder."""
+    setup = find_setup(scene)
+    if setup is not None and setup.map is not None and setup.map.image is not None:
+        _set_map_path(scene, blender_folder + bpy.path.basename(setup.map.image.filepath))
+
+
+def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
+    setup = find_setup(scene)
+    if setup is None or setup.map is None:
+        return
+    read_sequence(setup.map, MAP_IMAGE_NAME, path)
+    point_passes(setup.tree, path)
+
+
+def point_passes(tree: bpy.types.NodeTree, path: str) -> None:
+    """Let the disk's passes be read from beside a map."""
+    for node, crossing in disk_sync.passes_of(tree):
+        read_sequence(node, f"Umbra Disk Pass {crossing}", maps.pass_path(path, crossing))
+
+
+def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
+    """Let an image node read one file for each frame."""
+    if node.image is None or node.image.source != "SEQUENCE":
+        node.image = map_image(name)
+    for name, value in SEQUENCE_SETTINGS.items():
+        if getattr(node, name) != value:
+            setattr(node, name, value)
+    if node.image.filepath != path:
+        node.image.filepath = path
+
+
+def forget_loaded_map(scene: bpy.types.Scene) -> None:
+    """Let Blender read the maps anew from their files."""
+    setup = find_setup(scene)
+    if setup is not None and setup.map is not None and setup.map.image is not None:
+        setup.map.image.reload()
+    tree = find_tree(scene)
+    for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
+        if node.image is not None:
+            node.image.reload()
+
+
+def takes_sky_from_settings(setup: Setup) -> bool:
+    """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
+    socket = setup.group.inputs.get("Environment")
+    links = [] if socket is None else socket.links
+    return setup.sky is not None and any(link.from_node == setup.sky for link in links)
+
+
+def sync_sky(scene: bpy.types.Scene) -> None:
+    """Bring image, rotation and strength of the sky into the set-up.
+
+    A World's rotation and strength are followed by drivers, so that they stay in step when they are animated,
+    and in a Blender that lacks this add-on.
+
+    Raises
+    ------
+    SceneError
+        There is no sky, or it cannot be read.
+    """
+    setup = find_setup(scene)
+    if setup is None or not takes_sky_from_settings(setup):
+        return
+    sky = environment.read(scene)
+    if setup.sky.image != sky.image:
+        setup.sky.image = sky.image
+    if sky.texture is not None and sky.image.source in {"SEQUENCE", "MOVIE"}:
+        user = sky.texture.image_user
+        for name in ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh"):
+            setattr(setup.sky, name, getattr(user, name))
+    environment.check_image(sky.image)
+    from_world = scene.umbra.environment_source == "WORLD"
+    _follow(scene, setup, ROTATION_SOCKET, sky.rotation_path, sky.rotation, fixed=from_world)
+    _follow(scene, setup, STRENGTH_SOCKET, sky.strength_path, sky.strength, fixed=from_world)
+
+
+def _follow(
+    scene: bpy.types.Scene,
+    setup: Setup,
+    socket_name: str,
+    path: str | None,
+    value: "float | tuple[float, float, float]",
+    *,
+    fixed: bool,
+) -> None:
+    """Drive a socket of the group by a World's value; without a path, write a `fixed` value once."""
+    socket = setup.group.inputs.get(socket_name)
+    if socket is None:
+        return
+    is_vector = not isinstance(value, float)
+    socket_path = socket.path_from_id("default_value")
+    animation = setup.tree.animation_data
+    present = [each for each in animation.drivers if each.data_path == socket_path] if animation else []
+    if path is None:
+        for each in present:
+            animation.drivers.remove(each)
+        if fixed:
+            socket.default_value = value
+        elif present:  # the World's values are not those of a picture chosen by hand
+            socket.default_value = (0.0, 0.0, 0.0) if is_vector else 1.0
+        return
+    wanted = [f"{path}[{index}]" for index in range(3)] if is_vector else [path]
+    if [_driven_by(each, scene.world) for each in sorted(present, key=lambda each: each.array_index)] == wanted:
+        return
+    for each in present:
+        animation.drivers.remove(each)
+    for index, data_path in enumerate(wanted):
+        driver = socket.driver_add("default_value", *([index] if is_vector else [])).driver
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        target = variable.targets[0]
+        target.id_type = "WORLD"
+        target.id = scene.world
+        target.data_path = data_path
+    socket.default_value = value
+
+
+def _driven_by(curve: bpy.types.FCurve, world: bpy.types.World) -> str | None:
+    variables = curve.driver.variables
+    if len(variables) != 1 or variables[0].targets[0].id != world or not curve.driver.is_valid:
+        return None
+    return variables[0].targets[0].data_path

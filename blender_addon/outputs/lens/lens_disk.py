@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The disk in front of what the Cycles Lens shows: a camera's shader cannot shine, so the compositor draws it.
+
+All that the lens shows is behind the disk: a bent ray begins outside of the lens sphere, or ends in the hole. So the
+picture of the render layer goes through the group "Umbra Disk" before it goes where it went.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...bake import maps
+from ...core.physics_api import physics
+from ...nodes import disk_group
+from ...scene import frame_setup
+from ..compositor import compositing, compositor_sync
+from ..shared import disk_sync
+from ..shared.compositor_tree import find_node, find_tree, has_scene_tree, render_layers
+from . import lens_tree
+
+
+def put_in(scene: bpy.types.Scene) -> bpy.types.Node:
+    """Put the disk's nodes between the render and whatever its picture feeds, unless they are there.
+
+    Raises
+    ------
+    SceneError
+        The scene's compositor tree cannot be changed.
+    """
+    tree = lens_tree.claim(scene)
+    node = disk_sync.ensure_node(scene, tree)
+    if node.inputs[disk_group.BEHIND].is_linked:
+        return node
+    output = compositing.output_node(tree)
+    layers = render_layers(tree, scene)
+    layer = compositing.background_layer(output.inputs[0], layers, set()) if output is not None else None
+    if layer is None:
+        layer = layers[0] if layers else compositing.add_render_layer(tree, scene)
+    picture = layer.outputs["Image"]
+    fed = [link.to_socket for link in picture.links]
+    tree.links.new(picture, node.inputs[disk_group.BEHIND])
+    for socket in fed:
+        tree.links.new(node.outputs[disk_group.IMAGE], socket)
+    node.location = (layer.location.x + 300, layer.location.y)
+    disk_sync.arrange(tree, node)
+    if output is not None and not output.inputs[0].is_linked:
+        tree.links.new(node.outputs[disk_group.IMAGE], output.inputs[0])
+        node[compositing.OUTPUT_LINK] = True
+    return node
+
+
+def take_out(scene: bpy.types.Scene) -> None:
+    """Give the render's picture back to whatever the disk's feeds, and remove the disk's nodes."""
+    tree = find_tree(scene)
+    node = find_node(tree, disk_sync.DISK) if tree is not None else None
+    if node is not None:
+        compositing.give_back(tree, node, disk_group.BEHIND)
+        disk_sync.remove(tree)
+    lens_tree.release(scene)
+
+
+def is_in_use(scene: bpy.types.Scene) -> bool:
+    """Whether rendering the scene draws the disk over the lens's picture."""
+    if not scene.render.use_compositing or (has_scene_tree() and not scene.use_nodes):
+        return False
+    tree = find_tree(scene)
+    node = find_node(tree, disk_sync.DISK) if tree is not None else None
+    return node is not None and not node.mute and node.outputs[disk_group.IMAGE].is_linked
+
+
+# --- passes ---------------------------------------------------------------------------------------
+
+
+def parameters_of(scene: bpy.types.Scene, frame: frame_setup.Shot) -> "physics.WarpMapParameters":
+    """What the map is made from whose passes are drawn: the frame's own, or of the part that is rendered."""
+    part = _part(scene)
+    if part is None:
+        return frame.parameters
+    return replace(frame.parameters, camera=frame.parameters.camera.cropped(*part))
+
+
+def path_of(scene: bpy.types.Scene, frame: frame_setup.Shot) -> Path:
+    """Where that map lies, or will lie; its passes are beside it."""
+    return maps.map_path(scene, frame.hole_name, parameters_of(scene, frame).map_size, frame.frame)
+
+
+def point_at_passes(scene: bpy.types.Scene) -> None:
+    """Let the disk's nodes read the passes of the current resolution, and of the part that is rendered."""
+    tree, hole = find_tree(scene), frame_setup.find_active_hole(scene)
+    if tree is None or hole is None:
+        return
+    samples = int(scene.umbra.supersampling)
+    part = _part(scene)
+    width, height = frame_setup.render_size(scene.render) if part is None else part[2:]
+    compositor_sync.point_passes(tree, maps.blender_map_path(scene, hole.name, (width * samples, height * samples), 1))
+
+
+def point_at_nothing(scene: bpy.types.Scene) -> None:
+    """Let them read nothing: the picture is magenta until valid passes are in place."""
+    move_passes(scene, maps.folder(scene).blender_path, compositor_sync.NO_MAP)
+
+
+def move_passes(scene: bpy.types.Scene, blender_folder: str, name: str | None = None) -> None:
+    """Let them read from another folder, and those of another map where its file's name is given."""
+    tree = find_tree(scene)
+    if tree is None:
+        return
+    if name is not None:
+        compositor_sync.point_passes(tree, blender_folder + name)
+        return
+    for node, _crossing in disk_sync.passes_of(tree):
+        if node.image is not None:
+            path = blender_folder + bpy.path.basename(node.image.filepath)
+            compositor_sync.read_sequence(node, node.image.name, path)
+
+
+def _part(scene: bpy.types.Scene) -> tuple[int, int, int, int] | None:
+    """Column, row, width and height, in pixels from the top left, of what is rendered with Crop to Render Region."""
+    render = scene.render
+    if not (render.use_border and render.use_crop_to_border):
+        return None
+    width, height = frame_setup.render_size(render)
+    # Blender multiplies in single precision, and cuts off.
+    left, right = (int(np.float32(each) * np.float32(width)) for each in (render.border_min_x, render.border_max_x))
+    low, high = (int(np.float32(each) * np.float32(height)) for each in (render.border_min_y, render.border_max_y))
+    return left, height - high, max(right - left, 1), max(high - low, 1)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carry a frame into the camera that bends its rays: for the viewport at once, for a render with its exit map."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.physics_api import lens, physics
+from ...scene import frame_setup
+from ...settings.properties import CYCLES_LENS, EXIT_MAP
+from . import lens_camera, lens_shader
+
+# The first version whose Cycles counts a texture's rows from the bottom.
+UPWARDS_SINCE = (5, 2, 0)
+
+# A picture without anything in it: the parameters are not valid.
+BROKEN = {"broken": 1}
+
+
+def is_on(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's cameras bend their rays."""
+    return scene.umbra.output == CYCLES_LENS
+
+
+def uses_maps(scene: bpy.types.Scene) -> bool:
+    """Whether a render of the lens looks its rays up."""
+    return scene.umbra.lens_rays == EXIT_MAP
+
+
+def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
+    """What an exit map is made from: lines in the hole's frame do not depend on how that stands in the world.
+
+    A disk has no part in it: the compositor draws that, from passes of its own.
+    """
+    return replace(parameters, hole_to_world=physics.IDENTITY, disk=None)
+
+
+def values_of(scene: bpy.types.Scene, frame: frame_setup.Shot, map_path: Path | None = None) -> dict[str, object]:
+    """The shader's parameters for a frame; with an exit map, those of the variant that looks rays up."""
+    settings = scene.umbra
+    values = asdict(lens.LensNumbers.of(frame.parameters))
+    values |= {
+        "broken": 0,
+        "shift": (*frame.shift, 0.0),
+        "aperture": frame.aperture,
+        "length_of_m": frame.length_of_m,
+        "sphere_radius": float(settings.sphere_radius),
+        "redshift_colour": float(settings.redshift_colour),
+        "redshift_brightness": float(settings.redshift_brightness),
+        "temperature": float(settings.sky_temperature),
+    }
+    if map_path is not None:
+        width, height = frame.parameters.map_size
+        values |= {"exit_map": str(map_path), "map_size": (float(width), float(height), 0.0)}
+        values["map_upwards"] = int(bpy.app.version >= UPWARDS_SINCE)
+    return values
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Refuse a scene that cannot be rendered with the lens.
+
+    Raises
+    ------
+    SceneError
+        Another engine than Cycles.
+    """
+    if scene.render.engine != "CYCLES":
+        raise SceneError(
+            "The Cycles Lens needs the render engine Cycles: choose it in Render Properties, or Output: Compositor."
+        )
+
+
+def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
+    """The data of the scene's camera, converted if it is not yet.
+
+    Raises
+    ------
+    SceneError
+        There is no camera, or it cannot be converted.
+    """
+    if scene.camera is None or scene.camera.type != "CAMERA":
+        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+    lens_camera.convert(scene.camera.data)
+    return scene.camera.data
+
+
+def break_camera(scene: bpy.types.Scene) -> None:
+    """Let the camera see nothing until `show` gives it valid parameters."""
+    if scene.camera is not None and scene.camera.type == "CAMERA" and lens_camera.is_lens(scene.camera.data):
+        lens_shader.write(scene.camera.data, BROKEN)
+
+
+def show(scene: bpy.types.Scene, frame: frame_setup.Shot, map_path: Path | None = None) -> None:
+    """Let the camera see a frame, by its exit map or without.
+
+    Raises
+    ------
+    SceneError
+        There is no camera, or its shader cannot be made.
+    """
+    lens_shader.write(camera_of(scene), values_of(scene, frame, map_path))
+
+
+def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """Let the viewport see the scene as it stands, without a map; black where that is not possible.
+
+    The camera's own speed, which would take steps to other frames, is taken as none here.
+    """
+    if depsgraph is None:
+        depsgraph = depsgraph_of(scene)
+    try:
+        check(scene)
+        camera_of(scene)
+        show(scene, frame_setup.read(scene, depsgraph, velocity=np.zeros(3)))
+    except physics.BlackHoleError:  # the panel and the render say why
+        break_camera(scene)
+
+
+def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """The dependency graph of the scene's view layer, up to date."""
+    context = bpy.context
+    layer = context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
+    layer.update()
+    return layer.depsgraph

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A glowing mesh in the place of the disk that lights the scene's objects, and that no camera sees.
+
+It gives off the light of the disk at rest, as the picture would show it without streaks: to be as bright as what
+is seen is all that "matched" can mean, for the picture's brightness is the artist's to choose.
+"""
+
+import math
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.physics_api import disk_look, physics
+from ...nodes import disk_images
+from ...scene import disk_animation
+from ...settings import disk_properties
+
+NAME = "Umbra Disk Light"
+MARK = "umbra_disk_light"
+_MADE_FROM = "umbra_made_from"
+_ATTRIBUTE = "Light"
+_STRENGTH = "Strength"
+
+RINGS, SEGMENTS = 48, 96
+
+
+def find(hole: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The light of a hole's disk."""
+    return None if hole is None else next((each for each in hole.children if MARK in each), None)
+
+
+def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
+    """Add the light where the settings ask for it, bring it up to date, or remove it."""
+    for light in [each for each in scene.objects if MARK in each and (hole is None or each.parent != hole)]:
+        _remove(light)  # its hole is gone, or is not the one that is rendered
+    if hole is None or hole.library is not None:
+        return
+    settings = hole.umbra.disk
+    light = find(hole)
+    if not (settings.enabled and settings.light):
+        if light is not None:
+            _remove(light)
+        return
+    frame = scene.frame_current
+    spin, disk = disk_animation.disk_at(hole, frame)
+    look = disk_animation.look_at(hole, frame)
+    try:
+        disk.validate(spin, physics.DEFAULT_METHOD)
+        look.validate()
+    except physics.BlackHoleError:
+        return  # whoever reads the shot says so
+    if light is None:
+        light = _add(scene, hole)
+    picture = settings.texture if disk_properties.shows_picture(settings) else None
+    made_from = repr((spin, disk, look, None if picture is None else (picture.name, tuple(picture.size))))
+    if light.data.get(_MADE_FROM) != made_from:
+        _fill(light.data, disk, look, spin, None if picture is None else disk_images.mean_of_rows(picture))
+        light.data[_MADE_FROM] = made_from
+    scale = disk_animation.value_at(hole, "umbra.mass_scale", frame)
+    if not all(math.isclose(each, scale, rel_tol=1e-6) for each in light.scale):
+        light.scale = (scale,) * 3
+    strength = light.active_material.node_tree.nodes[_STRENGTH].inputs["Strength"]
+    wanted = disk_animation.value_at(hole, "umbra.disk.light_strength", frame)
+    if not math.isclose(strength.default_value, wanted, rel_tol=1e-6, abs_tol=1e-9):
+        strength.default_value = wanted
+
+
+def follow(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
+    """Bring the light to the scene's frame, where settings of the hole have keyframes."""
+    if find(hole) is not None and disk_animation.keyframes(hole):
+        refresh(scene, hole)
+
+
+def radiance(
+    disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: NDArray, rows: NDArray | None = None
+) -> NDArray:
+    """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
+
+    `rows`, shape (rows, 4), are the means round the disk of the picture whose colours it has.
+    """
+    if rows is not None:
+        inner, outer = disk.radii(spin)
+        depth = np.log(radius / inner) / np.log(outer / inner)
+        places = (np.arange(len(rows)) + 0.5) / len(rows)
+        mean = np.stack([np.interp(depth, places, channel) for channel in rows.T], axis=-1)
+        light = disk_look.tinted_light(look, disk, spin, radius, np.ones_like(radius), mean[:, :3])
+        return light * (look.opacity * disk_look.fade(look, disk, spin, radius))[:, None]
+    mean = np.full((*radius.shape, 2), 0.5)
+    thick = disk_look.density(look, disk, spin, radius, mean)
+    opacity = look.opacity * np.minimum(thick * disk_look.OPACITY_REACH, 1.0)
+    light = disk_look.emission(look, disk, spin, radius, np.ones_like(radius))
+    return light * (thick ** (look.gain - 1.0) * opacity)[..., None]
+
+
+def _fill(
+    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, rows: NDArray | None
+) -> None:
+    """Make the annulus, in units of M, its light at each vertex."""
+    radii = np.geomspace(*disk.radii(spin), RINGS)
+    angles = np.arange(SEGMENTS) * (2.0 * math.pi / SEGMENTS)
+    around = np.stack([np.cos(angles), np.sin(angles), np.zeros(SEGMENTS)], axis=-1)
+    places = (radii[:, None, None] * around).reshape(-1, 3)
+    ring, segment = np.divmod(np.arange((RINGS - 1) * SEGMENTS), SEGMENTS)
+    after = (segment + 1) % SEGMENTS
+    corners = np.stack([ring * SEGMENTS + segment, (ring + 1) * SEGMENTS + segment], axis=-1)
+    others = np.stack([(ring + 1) * SEGMENTS + after, ring * SEGMENTS + after], axis=-1)
+    mesh.clear_geometry()
+    mesh.from_pydata(places.tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
+    colours = np.ones((RINGS, SEGMENTS, 4), np.float32)
+    colours[..., :3] = radiance(disk, look, spin, radii, rows)[:, None, :]
+    attribute = mesh.attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "POINT")
+    attribute.data.foreach_set("color", colours.ravel())
+    mesh.update()
+
+
+def _add(scene: bpy.types.Scene, hole: bpy.types.Object) -> bpy.types.Object:
+    light = bpy.data.objects.new(NAME, bpy.data.meshes.new(NAME))
+    light[MARK] = True
+    light.data.materials.append(_material())
+    light.parent = hole
+    light.hide_select = True
+    light.display_type = "WIRE"
+    light.visible_camera = False
+    light.visible_shadow = False
+    homes = [each for each in hole.users_collection if each in (scene.collection, *scene.collection.children_recursive)]
+    (homes[0] if homes else scene.collection).objects.link(light)
+    return light
+
+
+def _material() -> bpy.types.Material:
+    """Emission by the vertices' light; camera rays pass, in engines that know no ray visibility too."""
+    material = bpy.data.materials.new(NAME)
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True  # always so from 5.0 on, where setting it is deprecated
+    tree = material.node_tree
+    tree.nodes.clear()
+    kinds = ("Attribute", "Emission", "BsdfTransparent", "LightPath", "MixShader", "OutputMaterial")
+    nodes = {}
+    for index, kind in enumerate(kinds):
+        nodes[kind] = tree.nodes.new(f"ShaderNode{kind}")
+        nodes[kind].location = (220.0 * index, 0.0)
+    nodes["Attribute"].attribute_name = _ATTRIBUTE
+    nodes["Emission"].name = _STRENGTH
+    for origin, target in (
+        (nodes["Attribute"].outputs["Color"], nodes["Emission"].inputs["Color"]),
+        (nodes["LightPath"].outputs["Is Camera Ray"], nodes["MixShader"].inputs[0]),
+        (nodes["Emission"].outputs[0], nodes["MixShader"].inputs[1]),
+        (nodes["BsdfTransparent"].outputs[0], nodes["MixShader"].inputs[2]),
+        (nodes["MixShader"].outputs[0], nodes["OutputMaterial"].inputs["Surface"]),
+    ):
+        tree.links.new(origin, target)
+    return material
+
+
+def _remove(light: bpy.types.Object) -> None:
+    mesh, material = light.data, light.active_material
+    bpy.data.objects.remove(light)
+    if mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+    if material is not None and material.users == 0:
+        bpy.data.materials.remove(material)

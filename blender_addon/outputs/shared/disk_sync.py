@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keep the group "Umbra Disk" in a scene's compositor while its hole has a disk, and in step with the settings.
+
+Time is followed by drivers that need no add-on, so that a .blend and its maps render the same without it. So are
+settings that are animated; but their drivers read this add-on's properties.
+"""
+
+import math
+
+import bpy
+
+from ...core import messages
+from ...core.errors import SceneError
+from ...core.physics_api import disk_flux, disk_texture, metric, orbiting_matter, physics
+from ...nodes import disk_group, disk_images
+from ...scene import disk_animation, frame_setup
+from ...settings import disk_properties
+from ...settings.properties import CYCLES_LENS
+from . import disk_light
+from .compositor_tree import ROLE, Setup, find_node, find_setup, find_tree
+
+DISK = "disk"
+TABLE_ROLES = {disk_group.COLOURS: "disk_colours", disk_group.TEXTURE: "disk_texture"}
+# Nodes that only files have whose group was of version 1.
+FORMER_ROLES = ("disk_profile",)
+SOCKET = "Disk"  # of the group "Umbra Black Hole"
+
+
+def pass_role(number: int) -> str:
+    """Role of the node that reads the pass of an image, counted from 1."""
+    return f"disk_pass_{number}"
+
+
+def refresh_hole(hole: bpy.types.Object) -> None:
+    """Carry a change of a hole's settings into all scenes that render it."""
+    for scene in bpy.data.scenes:
+        if isinstance(hole, bpy.types.Object) and frame_setup.find_active_hole(scene) == hole:
+            refresh_or_warn(scene)
+
+
+def refresh_or_warn(scene: bpy.types.Scene) -> None:
+    """The same as `refresh` where nobody could be told by an error."""
+    try:
+        refresh(scene)
+    except SceneError as error:
+        messages.warn(str(error))
+
+
+def refresh(scene: bpy.types.Scene) -> None:
+    """Put the disk's nodes into the scene's compositor, bring them up to date, or take them out.
+
+    Raises
+    ------
+    SceneError
+        The output is the Cycles Lens, and the compositor tree belongs to another file or scene.
+    """
+    from ..lens import lens_disk  # it calls this module
+
+    hole = frame_setup.find_active_hole(scene)
+    disk_light.refresh(scene, hole)
+    setup = find_setup(scene)
+    wanted = hole is not None and hole.umbra.disk.enabled
+    if setup is not None:
+        if setup.tree.library is not None:
+            return
+        if not wanted:
+            remove(setup.tree)
+            return
+        node = _put_in(scene, setup)
+    elif scene.umbra.output != CYCLES_LENS or scene.library is not None:
+        return
+    elif wanted:
+        node = lens_disk.put_in(scene)
+    else:
+        lens_disk.take_out(scene)
+        return
+    tree = node.id_data
+    disk = disk_properties.disk_of(hole.umbra.disk)
+    try:
+        disk.validate(hole.umbra.spin, scene.umbra.method)
+    except physics.BlackHoleError:
+        pass  # whoever reads the shot says so
+    else:
+        _follow_geometry(tree, node, hole, disk)
+        _follow_time(tree, node, hole, scene)
+    _follow_settings(tree, node, hole)
+    if setup is None:
+        lens_disk.point_at_passes(scene)
+    else:
+        _point_passes(setup)
+
+
+def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
+    """Refuse a frame whose disk is not the one that the compositor draws.
+
+    Blender takes the compositor's values from before the frame; what is written while it renders comes too late. Values
+    with keyframes or drivers have drivers of their own, which are evaluated in time; strips have none.
+
+    Raises
+    ------
+    SceneError
+        The spin or an edge is animated in a way that is not followed.
+    """
+    tree = find_tree(scene)
+    node = None if tree is None else find_node(tree, DISK)
+    if parameters.disk is None or node is None:
+        return
+    hole = frame_setup.active_hole(scene)
+    for name, (value, path) in _geometry(hole, parameters.spin, parameters.disk).items():
+        socket = node.inputs[name]
+        if path is None and not _is_close(socket.default_value, value):
+            raise SceneError(
+                f'The spin or the edges of "{hole.name}" are animated in a way that its disk cannot follow: give them '
+                "keyframes of their own in place of strips of the Nonlinear Animation."
+            )
+    if disk_animation.in_strips(hole) & {f"umbra.disk.{field}" for field in disk_group.LOOK_SOCKETS}:
+        raise SceneError(
+            f'Settings of the disk of "{hole.name}" are moved by strips of the Nonlinear Animation, which its picture '
+            "cannot follow: give them keyframes of their own (Object > Animation > Bake Action)."
+        )
+    driven = sorted(disk_animation.driven(hole) & {disk_animation.SPIN, disk_animation.INNER, disk_animation.OUTER})
+    if driven:
+        raise SceneError(
+            f'{driven[0].rpartition(".")[2].replace("_", " ").capitalize()} of "{hole.name}" has a driver, of which '
+            "the disk's streaks cannot know other frames: give it keyframes (Object > Animation > Bake Action)."
+        )
+
+
+# --- nodes ----------------------------------------------------------------------------------------
+
+
+def _put_in(scene: bpy.types.Scene, setup: Setup) -> bpy.types.Node:
+    """The disk's node behind the scene of a set-up with a bent sky."""
+    is_new = find_node(setup.tree, DISK) is None
+    node = ensure_node(scene, setup.tree)
+    if is_new:
+        x, y = setup.group.location
+        node.location = (x - 300, y - 1100)
+        arrange(setup.tree, node)
+    if not setup.group.inputs[SOCKET].is_linked:
+        setup.tree.links.new(node.outputs[disk_group.OUTPUT], setup.group.inputs[SOCKET])
+    return node
+
+
+def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.Node:
+    """The node of the disk's group in a tree, with the nodes of its pictures; not linked to anything else."""
+    settings = frame_setup.active_hole(scene).umbra.disk
+    images = int(settings.crossings)
+    group = disk_group.ensure(images, disk_properties.shows_picture(settings))
+    node = find_node(tree, DISK)
+    if node is None:
+        node = tree.nodes.new("CompositorNodeGroup")
+        node[ROLE] = DISK
+        node.width = 220.0
+    former = node.node_tree
+    if former != group:
+        targets = {each.name: [link.to_socket for link in each.links] for each in node.outputs}
+        behind = node.inputs.get(disk_group.BEHIND)
+        picture = behind.links[0].from_socket if behind is not None and behind.is_linked else None
+        _remove_drivers(tree, node.path_from_id() + ".")
+        for link in [link for socket in node.inputs for link in socket.links]:
+            tree.links.remove(link)  # kept, they would go by the order of the sockets
+        for role in (*(pass_role(number) for number in range(images + 1, physics.MOST_CROSSINGS + 1)), *FORMER_ROLES):
+            _remove_node(tree, role)
+        node.node_tree = group
+        for name, sockets in targets.items():
+            for socket in sockets:
+                tree.links.new(node.outputs[name], socket)
+        if picture is not None:
+            tree.links.new(picture, node.inputs[disk_group.BEHIND])
+        disk_group.remove_unused()
+    node.name = node.label = disk_group.GROUP_NAME
+    roles = (*(pass_role(number) for number in range(1, images + 1)), *TABLE_ROLES.values())
+    for role, name in zip(roles, (*disk_group.pass_names(images), *TABLE_ROLES), strict=True):
+        image = find_node(tree, role)
+        if image is None:
+            image = tree.nodes.new("CompositorNodeImage")
+            image[ROLE] = role
+            image.name, image.label = f"Umbra Disk {name}", f"Disk {name}"
+        if not any(link.from_node == image for link in node.inputs[name].links):
+            tree.links.new(image.outputs["Image"], node.inputs[name])
+    arrange(tree, node)
+    return node
+
+
+def arrange(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+    """Lay the disk's pictures out beside its node."""
+    roles = (*(pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1)), *TABLE_ROLES.values())
+    images = [image for image in (find_node(tree, role) for role in roles) if image is not None]
+    for index, image in enumerate(images):
+        image.location = (node.location.x - 300, node.location.y - 340 * (index + 1))
+
+
+def remove(tree: bpy.types.NodeTree) -> None:
+    """Take the disk's nodes out of a compositor."""
+    node = find_node(tree, DISK)
+    if node is not None:
+        _remove_drivers(tree, node.path_from_id() + ".")
+        tree.nodes.remove(node)
+        disk_group.remove_unused()
+    passes = (pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1))
+    for role in (*passes, *TABLE_ROLES.values(), *FORMER_ROLES):
+        _remove_node(tree, role)
+    disk_images.remove_unused()
+
+
+def _remove_node(tree: bpy.types.NodeTree, role: str) -> None:
+    node = find_node(tree, role)
+    if node is None:
+        return
+    image = node.image
+    tree.nodes.remove(node)
+    if image is not None and image.users == 0 and role.startswith("disk_pass_"):
+        bpy.data.images.remove(image)
+    disk_images.remove_unused()
+
+
+def _remove_drivers(tree: bpy.types.NodeTree, prefix: str) -> None:
+    if tree.animation_data is not None:
+        for curve in [each for each in tree.animation_data.drivers if each.data_path.startswith(prefix)]:
+            tree.animation_data.drivers.remove(curve)
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+def _geometry(hole: bpy.types.Object, spin: float, disk: "physics.Disk") -> dict[str, tuple[float, str | None]]:
+    """Values of the sockets that say what the disk is, and the paths that they follow where those are animated."""
+    animated = animated_paths(hole)
+    turning = disk_animation.SPIN in animated
+    inner, outer = disk.radii(spin)
+    orbit, factor = "umbra.disk.innermost_orbit", "umbra.disk.flux_factor"
+    inner_path = orbit if disk.inner_radius is None else disk_animation.INNER
+    inner_moves = turning if disk.inner_radius is None else disk_animation.INNER in animated
+    return {
+        disk_group.SPIN: (spin, disk_animation.SPIN if turning else None),
+        disk_group.DIRECTION: (orbiting_matter.matter_direction(spin, disk.retrograde), None),
+        disk_group.INNER: (inner, inner_path if inner_moves else None),
+        disk_group.OUTER: (outer, disk_animation.OUTER if disk_animation.OUTER in animated else None),
+        disk_group.INNERMOST: (metric.isco_radius(spin, not disk.retrograde), orbit if turning else None),
+        disk_group.FLUX_FACTOR: (1.0 / disk_flux.peak_flux(spin, disk.retrograde), factor if turning else None),
+    }
+
+
+def _follow_geometry(
+    tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object, disk: "physics.Disk"
+) -> None:
+    for name, (value, path) in _geometry(hole, float(hole.umbra.spin), disk).items():
+        _follow(tree, node.inputs[name], value, hole, path)
+
+
+def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object) -> None:
+    settings = hole.umbra.disk
+    animated = animated_paths(hole)
+    for field, name in disk_group.LOOK_SOCKETS.items():
+        path = f"umbra.disk.{field}"
+        _follow(tree, node.inputs[name], getattr(settings, field), hole, path if path in animated else None)
+    node.inputs[disk_group.BEAMING].default_value = disk_properties.BEAMINGS[settings.beaming]
+    node.inputs[disk_group.PAGE_THORNE].default_value = float(settings.profile != "power_law")
+    images = {
+        disk_group.COLOURS: disk_images.ensure_colours(),
+        disk_group.TEXTURE: settings.texture or disk_images.ensure_texture(),
+    }
+    for name, image in images.items():
+        table = find_node(tree, TABLE_ROLES[name])
+        if table.image != image:
+            table.image = image
+
+
+def _follow_time(
+    tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object, scene: bpy.types.Scene
+) -> None:
+    """Let phase and turns of the patterns follow the frame; see `physics.disk_texture.pattern_shares`."""
+    settings = hole.umbra.disk
+    period = disk_animation.pattern_period(scene, hole)
+    _set(tree, node.inputs[disk_group.PERIOD], period)
+    time_of_a_frame = settings.turning_speed * scene.render.fps_base / scene.render.fps
+    lives = f"(frame*{time_of_a_frame / period!r})"
+    (age, _, first), (_, _, second) = disk_texture.pattern_shares(scene.frame_current * time_of_a_frame, period)
+    for name, value, expression in (
+        (disk_group.PHASE, age / period, f"{lives}-floor{lives}"),
+        (disk_group.FIRST_TURN, first, _turn(f"2*floor{lives}")),
+        (disk_group.SECOND_TURN, second, _turn(f"(2*floor({lives}+0.5)+1)")),
+    ):
+        _set(tree, node.inputs[name], value, expression)
+
+
+def _turn(number: str) -> str:
+    """2 pi times the fraction of the number of a pattern times the golden section."""
+    turns = f"{number}*{disk_texture.TURN_BETWEEN!r}"
+    return f"{2.0 * math.pi!r}*({turns}-floor({turns}))"
+
+
+def animated_paths(hole: bpy.types.Object) -> set[str]:
+    """The hole's properties that have keyframes or drivers; strips of other actions are left out."""
+    return disk_animation.driven(hole) | disk_animation.keyframes(hole).keys()
+
+
+def _follow(
+    tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: float, hole: bpy.types.Object, path: str | None
+) -> None:
+    """Give a socket a value, or let it follow a property of the hole."""
+    _set(tree, socket, value, None if path is None else "a", None if path is None else (hole, path))
+
+
+def _is_close(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-9)
+
+
+def _set(
+    tree: bpy.types.NodeTree,
+    socket: bpy.types.NodeSocket,
+    value: float,
+    expression: str | None = None,
+    source: tuple[bpy.types.ID, str] | None = None,
+) -> None:
+    """Give a socket a value and, with an expression, a driver; the expression may use a property as `a`."""
+    path = socket.path_from_id("default_value")
+    present = tree.animation_data.drivers.find(path) if tree.animation_data is not None else None
+    if present is not None and not (expression is not None and _drives(present, expression, source)):
+        tree.animation_data.drivers.remove(present)
+        present = None
+    if present is None and expression is not None:
+        driver = socket.driver_add("default_value").driver
+        driver.type = "SCRIPTED"
+        if source is not None:
+            variable = driver.variables.new()
+            variable.name = "a"
+            variable.targets[0].id, variable.targets[0].data_path = source
+        driver.expression = expression
+    if not _is_close(socket.default_value, value):
+        socket.default_value = value
+
+
+def _drives(curve: bpy.types.FCurve, expression: str, source: tuple[bpy.types.ID, str] | None) -> bool:
+    driver = curve.driver
+    found = [(each.targets[0].id, each.targets[0].data_path) for each in driver.variables]
+    return driver.is_valid and driver.expression == expression and found == ([] if source is None else [source])
+
+
+# --- passes ---------------------------------------------------------------------------------------
+
+
+def _point_passes(setup: Setup) -> None:
+    """Let the passes be read from beside the map that is read."""
+    from ..compositor import compositor_sync  # it calls this module
+
+    if setup.map is not None and setup.map.image is not None:
+        compositor_sync.point_passes(setup.tree, setup.map.image.filepath)
+
+
+def passes_of(tree: bpy.types.NodeTree) -> list[tuple[bpy.types.Node, int]]:
+    """The image nodes of the passes that there are, and the numbers of their crossings."""
+    numbers = range(1, physics.MOST_CROSSINGS + 1)
+    nodes = [(find_node(tree, pass_role(number)), number) for number in numbers]
+    return [(node, number) for node, number in nodes if node is not None]

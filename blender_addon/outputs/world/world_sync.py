@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which map a lensed World reads: the files of the frames, none at all, or the one that the preview keeps."""
+
+import bpy
+import numpy as np
+
+from ...bake import maps
+from ...core import messages
+from ...core.errors import SceneError
+from ...core.physics_api import physics, world_map
+from ...nodes import world_group
+from ...nodes.world_nodes import map_nodes
+from ...scene import frame_setup
+from ...settings.properties import WORLD
+from ..compositor import compositor_sync
+from . import lensed_world
+
+FILE_IMAGE_NAME, LIVE_IMAGE_NAME = "Umbra World Map", "Umbra Live Map"
+
+
+def is_on(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's output is its World."""
+    return scene.umbra.output == WORLD
+
+
+def refresh(scene: bpy.types.Scene) -> None:
+    """Carry the scene's settings into its lensed World: another sky, another folder of maps."""
+    world = lensed_world.lensed_world(scene)
+    shows_image = scene.umbra.environment_source == "IMAGE"
+    if world is not None and scene.get(lensed_world.IS_BENT) and _is_stale(scene, world, shows_image=shows_image):
+        values = inputs_of(lensed_world.group_node(world))
+        before = scene.get(lensed_world.BEFORE)
+        try:
+            lensed_world.remove(scene)
+            set_inputs(lensed_world.install(scene), values)
+        except SceneError as error:
+            messages.warn(str(error))
+            scene.world = before
+            return
+    if not shows_live(scene):
+        point_at_files(scene)
+
+
+def _is_stale(scene: bpy.types.Scene, world: bpy.types.World, *, shows_image: bool) -> bool:
+    """Whether the World was made for another sky than the one that is chosen."""
+    made_of_image = world.get(lensed_world.LENSED) == lensed_world.OF_IMAGE
+    if made_of_image != shows_image:
+        return True
+    if not shows_image:
+        return False
+    texture = next((node for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT"), None)
+    return texture is not None and texture.image != scene.umbra.environment_image
+
+
+def inputs_of(node: bpy.types.Node) -> dict[str, float]:
+    """The values of a group node's inputs that are not linked."""
+    return {socket.name: socket.default_value for socket in node.inputs if not socket.is_linked}
+
+
+def set_inputs(node: bpy.types.Node, values: dict[str, object]) -> None:
+    """Give a group node those values that it has inputs for."""
+    for name, value in values.items():
+        socket = node.inputs.get(name)
+        if socket is not None and not socket.is_linked and isinstance(value, float):
+            socket.default_value = value
+
+
+# --- which map is read ----------------------------------------------------------------------------
+
+
+def _group(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
+    """The group in the scene's lensed World, whole, and its own: a copy of the World shares it at first."""
+    node = lensed_world.group_node(lensed_world.lensed_world(scene))
+    if node is None:
+        return None
+    if node.node_tree.library is None:
+        if node.node_tree.users > 1:
+            node.node_tree = node.node_tree.copy()
+        world_group.mend(node.node_tree)
+    return node.node_tree
+
+
+def _point(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
+    group = _group(scene)
+    if group is None:
+        return
+    for node in map_nodes(group):
+        if node.image != image:
+            node.image = image
+        if image.source == "SEQUENCE":
+            for name, value in compositor_sync.SEQUENCE_SETTINGS.items():
+                if getattr(node.image_user, name) != value:
+                    setattr(node.image_user, name, value)
+
+
+def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
+    """An image that a World remembers; not one that it shares with the World it is a copy of."""
+    image = world.get(key)
+    shared = any(each != world and each.get(key) == image for each in bpy.data.worlds)
+    return None if shared else image
+
+
+def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
+    """The image that reads the scene's maps: the one in use, or another."""
+    world = lensed_world.lensed_world(scene)
+    present = _own(world, lensed_world.FILE_IMAGE)
+    if present is None:
+        present = compositor_sync.map_image(FILE_IMAGE_NAME)
+        present.use_half_precision = False
+        world[lensed_world.FILE_IMAGE] = present
+    return present
+
+
+def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
+    if lensed_world.lensed_world(scene) is None:
+        return
+    image = _file_image(scene)
+    if image.filepath != path:
+        image.filepath = path
+    _point(scene, image)
+
+
+def point_at_files(scene: bpy.types.Scene) -> None:
+    """Let the World read the map of each frame from its file; no map where there is no hole."""
+    hole = frame_setup.find_active_hole(scene)
+    if hole is None:
+        point_at_nothing(scene)
+        return
+    columns, rows = world_map.FINAL
+    name = maps.world_map_name(scene, hole.name, (columns, rows + 1), 1)
+    _point_at_path(scene, maps.folder(scene).blender_path + name)
+
+
+def point_at_nothing(scene: bpy.types.Scene) -> None:
+    """Let the World read no map: it is magenta."""
+    _point_at_path(scene, maps.folder(scene).blender_path + compositor_sync.NO_MAP)
+
+
+def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
+    """Let the World read the same files from another folder."""
+    if lensed_world.lensed_world(scene) is not None:
+        name = bpy.path.basename(_file_image(scene).filepath)
+        _point_at_path(scene, blender_folder + name)
+
+
+def forget_loaded_map(scene: bpy.types.Scene) -> None:
+    """Let Blender read the maps anew from their files."""
+    if lensed_world.lensed_world(scene) is not None:
+        _file_image(scene).reload()
+
+
+# --- the preview's map ----------------------------------------------------------------------------
+
+
+def shows_live(scene: bpy.types.Scene) -> bool:
+    """Whether the World reads the preview's map."""
+    return _shown_live(scene) is not None
+
+
+def live_images(world: bpy.types.World) -> list[bpy.types.Image]:
+    """The images that the preview's map is kept in."""
+    return [world[key] for key in lensed_world.LIVE_IMAGES if world.get(key) is not None]
+
+
+def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    """The image of the preview's map that the World reads now."""
+    world = lensed_world.lensed_world(scene)
+    if world is None:
+        return None
+    read = {each.image for each in map_nodes(lensed_world.group_node(world).node_tree)}
+    image = read.pop() if len(read) == 1 else None
+    return image if image in live_images(world) else None
+
+
+def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
+    """Let the World read a map that is in memory; always through the same image, or through two in turn."""
+    world = lensed_world.lensed_world(scene)
+    if world is None:
+        return
+    shown = _shown_live(scene)
+    key = _next_key(scene, world, shown)
+    image = _own(world, key)
+    rows, columns = made.texture.shape[:2]
+    if image is None or tuple(image.size) != (columns, rows):
+        image = bpy.data.images.new(LIVE_IMAGE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
+        image.alpha_mode = "CHANNEL_PACKED"
+        image.use_half_precision = False
+        world[key] = image
+    image.pixels.foreach_set(np.ravel(made.texture))
+    image.update()
+    tree = lensed_world.group_node(world).node_tree
+    if shown is None or tree.users > 1:
+        _point(scene, image)
+    elif shown != image:  # looking after the group, too, would take longer than the map
+        for node in map_nodes(tree):
+            node.image = image
+
+
+def _next_key(scene: bpy.types.Scene, world: bpy.types.World, shown: bpy.types.Image | None) -> str:
+    """Under which key the next map goes: Cycles keeps the pixels of an image for as long as a shader reads it."""
+    first, second = lensed_world.LIVE_IMAGES
+    return second if needs_turns(scene) and shown is not None and shown == world.get(first) else first
+
+
+def needs_turns(scene: bpy.types.Scene) -> bool:
+    """Whether a map that has changed must come as another image to be seen."""
+    return scene.render.engine == "CYCLES"
+
+
+def show_again(scene: bpy.types.Scene) -> None:
+    """Let Cycles see the map once more: of two changes between two of its looks it has seen neither."""
+    shown = _shown_live(scene)
+    if shown is None:
+        return
+    rows, columns = shown.size[1], shown.size[0]
+    texture = np.empty(rows * columns * 4, np.float32)
+    shown.pixels.foreach_get(texture)
+    show_live(scene, world_map.WorldMap(texture.reshape(rows, columns, 4), {}))
+
+
+def drop_live(scene: bpy.types.Scene) -> None:
+    """Let the World read its files again, and free the preview's map."""
+    world = lensed_world.lensed_world(scene)
+    if world is None:
+        return
+    point_at_files(scene)
+    images = live_images(world)
+    for key in lensed_world.LIVE_IMAGES:
+        if key in world:
+            del world[key]
+    for image in images:
+        if image.users == 0:
+            bpy.data.images.remove(image)
+
+
+# --- rendering ------------------------------------------------------------------------------------
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Refuse a scene whose World is not the lensed one any more.
+
+    Raises
+    ------
+    SceneError
+        Another World was chosen, or a view layer has one of its own.
+    """
+    if lensed_world.lensed_world(scene) is None:
+        raise SceneError(
+            f'Scene "{scene.name}" has the output World, but another World was chosen since: set Output: World again.'
+        )
+    for layer in scene.view_layers:
+        if layer.use and getattr(layer, "world_override", None) is not None:
+            raise SceneError(
+                f'View layer "{layer.name}" has a World Override, which hides the lensed World: clear it in View Layer '
+                "Properties, or choose another output."
+            )
+
+
+def check_resolved(metadata: dict, frame_shot: frame_setup.Shot) -> None:
+    """Refuse a map with rays that its method could not resolve.
+
+    Raises
+    ------
+    SceneError
+        There are some.
+    """
+    unresolved = metadata["counts"]["unresolved"]
+    if unresolved:
+        label = physics.METHODS[frame_shot.parameters.method].label
+        raise SceneError(
+            f"Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "
+            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
+        )
+
+
+def warnings(scene: bpy.types.Scene, frame_shot: frame_setup.Shot) -> list[str]:
+    """What a render of a frame leaves out, in sentences."""
+    found = []
+    if scene.render.film_transparent:
+        found.append("Film > Transparent is on: the camera does not see the World.")
+    if frame_shot.parameters.disk is not None:
+        found.append(
+            f'The disk of "{frame_shot.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.'
+        )
+    return found

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hole's settings at any frame, from their keyframes: known before Blender has evaluated the frame."""
+
+import bpy
+import numpy as np
+
+from ..core.physics_api import disk_look, disk_texture, metric, physics
+from ..settings.disk_properties import BEAMINGS, LOOK_FIELDS, disk_of
+
+SPIN, INNER, OUTER = "umbra.spin", "umbra.disk.inner_radius", "umbra.disk.outer_radius"
+
+
+def keyframes(hole: bpy.types.Object) -> dict[str, bpy.types.FCurve]:
+    """The curves of the hole's action by their data paths; strips of other actions are left out."""
+    animation = hole.animation_data
+    if animation is None or animation.action is None:
+        return {}
+    bags = [
+        strip.channelbag(animation.action_slot)
+        for layer in animation.action.layers
+        for strip in layer.strips
+        if animation.action_slot is not None
+    ]
+    return {curve.data_path: curve for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
+
+
+def in_strips(hole: bpy.types.Object) -> set[str]:
+    """Data paths that strips of the Nonlinear Animation move."""
+    tracks = [] if hole.animation_data is None else hole.animation_data.nla_tracks
+    actions = [each.action for track in tracks if not track.mute for each in track.strips if not each.mute]
+    return {
+        curve.data_path
+        for action in actions
+        if action is not None
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    }
+
+
+def driven(hole: bpy.types.Object) -> set[str]:
+    """Data paths of the hole's properties that have drivers."""
+    return set() if hole.animation_data is None else {curve.data_path for curve in hole.animation_data.drivers}
+
+
+def value_at(hole: bpy.types.Object, path: str, frame: float) -> float:
+    """A number among the hole's settings at a frame; without keyframes, as it stands."""
+    curve = keyframes(hole).get(path)
+    return float(hole.path_resolve(path)) if curve is None else _limited(hole, path, curve.evaluate(frame))
+
+
+def _limited(hole: bpy.types.Object, path: str, value: float) -> float:
+    """What Blender makes of a curve's value: single precision, within the property's range."""
+    owner, _, name = path.rpartition(".")
+    limits = (hole.path_resolve(owner) if owner else hole).bl_rna.properties[name]
+    return float(np.float32(np.clip(value, limits.hard_min, limits.hard_max)))
+
+
+def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]":
+    """The hole's spin, and its disk, at a frame."""
+    settings = hole.umbra.disk
+    disk = physics.Disk(
+        crossings=int(settings.crossings),
+        inner_radius=None if settings.inner_at_isco else value_at(hole, INNER, frame),
+        outer_radius=value_at(hole, OUTER, frame),
+        retrograde=bool(settings.retrograde),
+    )
+    return value_at(hole, SPIN, frame), disk
+
+
+def look_at(hole: bpy.types.Object, frame: float) -> "disk_look.DiskLook":
+    """How the hole's disk looks at a frame."""
+    settings = hole.umbra.disk
+    values = {
+        name: settings.profile if name == "profile" else value_at(hole, f"umbra.disk.{name}", frame)
+        for name in LOOK_FIELDS
+    }
+    return disk_look.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+
+
+def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
+    """How long a pattern of the streaks lives, units of M: one time for the whole animation.
+
+    Where spin or edges have keyframes it is the shortest of all frames, so that no frame shears a pattern further than
+    it should be; with a time of its own for each frame, patterns would hurry or stand still as it changes.
+    """
+    settings = hole.umbra.disk
+    curves = keyframes(hole)
+    if not curves.keys() & {SPIN, INNER, OUTER}:
+        disk = disk_of(settings)
+        return disk_texture.pattern_period(hole.umbra.spin, *disk.radii(hole.umbra.spin), disk.retrograde)
+    periods = []
+    done = set()
+    for frame in range(scene.frame_start, scene.frame_end + 1):
+        spin, disk = disk_at(hole, frame)
+        radii = disk.radii(spin)
+        if (spin, radii) in done:
+            continue
+        done.add((spin, radii))
+        if metric.horizon_radius(spin) < radii[0] < radii[1]:  # frames without a disk are refused when they come
+            periods.append(disk_texture.pattern_period(spin, *radii, disk.retrograde))
+    return min(periods, default=1.0)

@@ -1,0 +1,394 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read what a frame needs from Blender: hole, camera and render size become `physics.WarpMapParameters`.
+
+Plain functions over evaluated data. Nothing here writes to the scene, except `read_at` and `camera_velocity`,
+which step to other frames and back.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import SceneError
+from ..core.physics_api import physics
+from ..outputs.lens.lens_camera import original_type
+from ..settings.disk_properties import disk_of
+from ..settings.properties import CAMERA_ANIMATION, COMPOSITOR, MOTIONS, WORLD, tolerances_of
+
+# Object matrices are float32: axes may differ in length, and from right angles, by so much from
+# rounding.
+MATRIX_TOLERANCE = 1e-4
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Rows = tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Everything that makes the warp map of one frame."""
+
+    frame: int
+    hole_name: str
+    parameters: physics.WarpMapParameters
+    length_of_m: float
+    """Scene units."""
+    shift: tuple[float, float]
+    """Lens shift of the camera as Blender has it."""
+    aperture: float
+    """Radius of the camera's aperture, scene units, 0 without depth of field: Cycles' for any but custom cameras."""
+
+    @property
+    def distance(self) -> float:
+        """Distance of the camera from the hole's centre, in units of M."""
+        return float(np.linalg.norm(self.parameters.camera_position))
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where an object is (scene units), its axes (columns, a rotation) and its uniform scale."""
+
+    position: Vector
+    rotation: Matrix
+    scale: float
+
+
+# --- hole -----------------------------------------------------------------------------------------
+
+
+def holes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """All black holes of a scene, by name."""
+    found = [each for each in scene.objects if each.umbra.is_black_hole]
+    return sorted(found, key=lambda each: each.name)
+
+
+def find_active_hole(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The hole that is rendered: the chosen one, or the only one; None where there is neither."""
+    chosen = scene.umbra.active_hole
+    if chosen is not None and chosen.umbra.is_black_hole and scene in chosen.users_scene:
+        return chosen
+    if chosen is None:
+        found = holes(scene)
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The hole that is rendered.
+
+    Raises
+    ------
+    SceneError
+        There is none, or it was deleted, or there are several and none is chosen.
+    """
+    hole = find_active_hole(scene)
+    if hole is not None:
+        return hole
+    chosen = scene.umbra.active_hole
+    if chosen is not None:
+        raise SceneError(
+            f'The black hole "{chosen.name}" is no longer in scene "{scene.name}": choose another one in the '
+            "Umbra panel, add one with Add > Black Hole, or take the compositor set-up out with Remove from "
+            "Compositor."
+        )
+    if holes(scene):
+        raise SceneError(
+            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is rendered.'
+        )
+    raise SceneError(
+        f'Scene "{scene.name}" contains no black hole: add one with Add > Black Hole, or take the compositor '
+        "set-up out with Remove from Compositor."
+    )
+
+
+def _check_evaluated(hole: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Refuse a hole whose animation Blender does not evaluate here: it would stand still, without a word."""
+    rendering = depsgraph.mode == "RENDER"
+    if hole.hide_render if rendering else hole.hide_viewport:
+        where = "renders" if rendering else "viewports"
+        raise SceneError(
+            f'The black hole "{hole.name}" is disabled in {where}, so Blender does not move it: enable it in '
+            "the Outliner, or take the compositor set-up out with Remove from Compositor."
+        )
+    layer = depsgraph.view_layer
+    if layer.objects.get(hole.name) is None:
+        raise SceneError(
+            f'The black hole "{hole.name}" is in a collection that view layer "{layer.name}" excludes, so '
+            "Blender does not move it: include that collection."
+        )
+
+
+# --- places ---------------------------------------------------------------------------------------
+
+
+def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
+    """Place, axes and scale of an evaluated object, parents and constraints included.
+
+    Parameters
+    ----------
+    evaluated : Object
+        The object as a dependency graph evaluated it.
+    what : str
+        How a message names it.
+    keep_scale : bool
+        True where the scale means something (the hole: it must be uniform), False where it does not.
+
+    Raises
+    ------
+    SceneError
+        The axes are not a rotation times a scale: non-uniform, sheared, mirrored or zero.
+    """
+    matrix = np.array(evaluated.matrix_world, dtype=np.float64)
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
+        raise SceneError(f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.')
+    if keep_scale and lengths.max() - lengths.min() > MATRIX_TOLERANCE * lengths.max():
+        raise SceneError(
+            f'{what} "{evaluated.name}" has a different scale along x, y and z: make all three the same (its '
+            "parents' scales count too)."
+        )
+    axes = matrix[:3, :3] / lengths
+    if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
+        raise SceneError(
+            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.'
+        )
+    if np.linalg.det(axes) < 0.0:
+        raise SceneError(f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.')
+    # the nearest rotation, free of float32's rounding
+    left, _, right = np.linalg.svd(axes)
+    return Pose(matrix[:3, 3], left @ right, float(lengths.mean()))
+
+
+def camera_velocity(
+    scene: bpy.types.Scene, hole: bpy.types.Object, camera: bpy.types.Object, view_layer: bpy.types.ViewLayer
+) -> Vector:
+    """Velocity of the camera relative to the hole's centre at the current frame, scene units a second.
+
+    Central difference between half a frame earlier and half a frame later, along the scene's world axes.
+    """
+    frame = scene.frame_current
+    rate = scene.render.fps / scene.render.fps_base
+
+    def separation(whole: int, part: float) -> Vector:
+        scene.frame_set(whole, subframe=part)
+        depsgraph = view_layer.depsgraph
+        places = [np.array(each.evaluated_get(depsgraph).matrix_world.translation) for each in (camera, hole)]
+        return np.subtract(places[0], places[1], dtype=np.float64)
+
+    with _frame_kept(scene):
+        before = separation(frame - 1, 0.5)
+        after = separation(frame, 0.5)
+    return (after - before) * rate
+
+
+@contextmanager
+def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Go back to the current frame afterwards, whatever happens."""
+    frame, part = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        if (scene.frame_current, scene.frame_subframe) != (frame, part):
+            scene.frame_set(frame, subframe=part)
+
+
+# --- camera ---------------------------------------------------------------------------------------
+
+
+def render_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
+    """Width and height of the picture that is rendered now, in pixels (the resolution percentage counts)."""
+    percentage = render.resolution_percentage
+    return (
+        max(render.resolution_x * percentage // 100, 1),
+        max(render.resolution_y * percentage // 100, 1),
+    )
+
+
+def check_render(render: bpy.types.RenderSettings, *, bends_rays: bool = False) -> None:
+    """Refuse render settings for which the map would not fit the picture; a camera that bends its rays takes a crop.
+
+    Raises
+    ------
+    SceneError
+        Crop to Render Region, or Stereoscopy.
+    """
+    if render.use_border and render.use_crop_to_border and not bends_rays:
+        raise SceneError(
+            "Crop to Render Region is not supported with a black hole in the compositor: switch it off in Output "
+            "Properties > Format (the render region itself works), or choose Output: Cycles Lens."
+        )
+    if render.use_multiview:
+        raise SceneError(
+            "Stereoscopy is not supported with a black hole: switch it off in Output Properties, or render "
+            "each eye as a camera of its own."
+        )
+
+
+def _panorama_setting(camera: bpy.types.Camera, name: str) -> object:
+    """A panorama setting, which Cycles kept for itself before Blender took it over."""
+    owner = camera if hasattr(camera, name) else camera.cycles
+    return getattr(owner, name)
+
+
+def camera_model(
+    camera: bpy.types.Camera, render: bpy.types.RenderSettings, engine: str, *, world_output: bool = False
+) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
+    """The physics' camera for a Blender camera's (evaluated) settings; for the World output any stands for all.
+
+    Raises
+    ------
+    SceneError
+        An orthographic or custom camera, a panorama other than equirectangular, or one outside Cycles.
+    """
+    width, height = render_size(render)
+    kind_of_lens = original_type(camera)
+    if world_output and kind_of_lens != "ORTHO":
+        return physics.PanoramaCamera(width, height)  # the World is looked up by direction, whatever the lens
+    if kind_of_lens == "PERSP":
+        return physics.PerspectiveCamera(
+            width,
+            height,
+            focal_length=camera.lens,
+            sensor_width=camera.sensor_width,
+            sensor_height=camera.sensor_height,
+            sensor_fit=camera.sensor_fit,
+            shift_x=camera.shift_x,
+            shift_y=camera.shift_y,
+            pixel_aspect_x=render.pixel_aspect_x,
+            pixel_aspect_y=render.pixel_aspect_y,
+        )
+    if kind_of_lens == "PANO":
+        kind = _panorama_setting(camera, "panorama_type")
+        if kind != "EQUIRECTANGULAR":
+            raise SceneError(
+                f'Camera "{camera.name}" is a panorama of type {str(kind).replace("_", " ").title()}: only '
+                "Equirectangular panoramas can show a black hole; choose that, or a perspective camera."
+            )
+        if engine != "CYCLES":
+            raise SceneError(
+                f'Camera "{camera.name}" is a panorama, which only Cycles renders: choose Cycles, or a '
+                "perspective camera."
+            )
+        limits = ("latitude_min", "latitude_max", "longitude_min", "longitude_max")
+        return physics.PanoramaCamera(width, height, **{name: _panorama_setting(camera, name) for name in limits})
+    if kind_of_lens == "ORTHO":
+        raise SceneError(
+            f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the '
+            "camera perspective."
+        )
+    raise SceneError(
+        f'Camera "{camera.name}" is of type {camera.type.title()}, which cannot show a black hole: make it '
+        "perspective or an equirectangular panorama."
+    )
+
+
+def _aperture(camera: bpy.types.Camera) -> float:
+    if not camera.dof.use_dof:
+        return 0.0
+    return camera.lens * 1e-3 / (2.0 * max(camera.dof.aperture_fstop, 1e-5))
+
+
+# --- all together ---------------------------------------------------------------------------------
+
+
+def _rows(matrix: Matrix) -> Rows:
+    return tuple(tuple(float(value) for value in row) for row in matrix)
+
+
+def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vector | None = None) -> Shot:
+    """The shot of the frame at which the dependency graph stands.
+
+    Parameters
+    ----------
+    scene : Scene
+        The (original) scene.
+    depsgraph : Depsgraph
+        Evaluated at the frame; of a render, or of a viewport.
+    velocity : array, shape (3,), optional
+        The camera's velocity, scene units a second, world axes, for the motion Camera Animation. Without it,
+        it is measured, which steps the scene half a frame back and forth.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        Whatever makes the frame impossible, as one sentence for the artist.
+    """
+    check_render(scene.render, bends_rays=scene.umbra.output != COMPOSITOR)
+    hole = active_hole(scene)
+    _check_evaluated(hole, depsgraph)
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA":
+        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+
+    evaluated_hole = hole.evaluated_get(depsgraph)
+    evaluated_camera = camera.evaluated_get(depsgraph)
+    hole_settings = evaluated_hole.umbra
+    hole_pose = pose(evaluated_hole, "The black hole", keep_scale=True)
+    camera_pose = pose(evaluated_camera, "The camera", keep_scale=False)
+    world_to_hole = hole_pose.rotation.T
+    length_of_m = hole_settings.mass_scale * hole_pose.scale
+
+    speed = np.zeros(3)
+    if hole_settings.motion == CAMERA_ANIMATION:
+        if velocity is None:
+            layer = scene.view_layers.get(depsgraph.view_layer.name) or scene.view_layers[0]
+            velocity = camera_velocity(scene, hole, camera, layer)
+        speed = world_to_hole @ velocity / hole_settings.speed_of_light
+        if np.linalg.norm(speed) >= 1.0:
+            raise SceneError(
+                f'Frame {scene.frame_current}: camera "{camera.name}" moves at {np.linalg.norm(speed):.3g} '
+                "times the speed of light; slow its animation down, or raise the black hole's Speed of Light "
+                f"above {np.linalg.norm(velocity):.4g} scene units a second."
+            )
+
+    settings = scene.umbra
+    tolerance, interpolation = tolerances_of(settings)
+    position = world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m
+    parameters = physics.WarpMapParameters(
+        spin=float(hole_settings.spin),
+        camera=camera_model(
+            evaluated_camera.data, scene.render, scene.render.engine, world_output=settings.output == WORLD
+        ),
+        camera_position=tuple(float(value) for value in position),
+        camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
+        hole_to_world=_rows(hole_pose.rotation),
+        motion=MOTIONS[hole_settings.motion],
+        velocity=tuple(float(value) for value in speed),
+        supersampling=int(settings.supersampling),
+        tolerance=tolerance,
+        method=settings.method,
+        interpolation=interpolation,
+        disk=disk_of(hole_settings.disk),
+    )
+    parameters.validate()
+    data = evaluated_camera.data
+    shift = (data.shift_x, data.shift_y)
+    return Shot(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data))
+
+
+def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> Shot:
+    """The shot of any frame; the scene is back at its current frame afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    frame : int
+        The frame to read.
+    view_layer : ViewLayer, optional
+        The layer whose objects count; the first that is rendered by default.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        See `read`.
+    """
+    layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
+    with _frame_kept(scene):
+        scene.frame_set(frame)
+        return read(scene, layer.depsgraph)

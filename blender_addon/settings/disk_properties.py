@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist sets of a hole's accretion disk: `object.umbra.disk`."""
+
+import bpy
+
+from ..core.physics_api import disk_flux, disk_look, metric, physics
+
+# Blender saves an enum's number; identifiers are the physics' own names.
+PROFILES = (
+    ("novikov_thorne", "Page-Thorne", "As physics has it: dark at the innermost stable orbit, brightest outside of it"),
+    ("power_law", "Power Law", "Brightest at the inner edge, and dimmer outwards by a power of the radius"),
+)
+BEAMINGS = {"BOLOMETRIC": disk_look.BOLOMETRIC, "MONOCHROMATIC": disk_look.MONOCHROMATIC}
+
+# As many as the physics follows.
+MOST_IMAGES = physics.MOST_CROSSINGS
+
+# How the artist's picture is used; identifiers are saved in files.
+DENSITY, COLOUR = "DENSITY", "COLOUR"
+
+# With a new disk, the inner edge turns round in some four seconds.
+DEFAULT_SPEED = 12.0
+DEFAULT_LOOK = "gargantua"
+_LOOK = disk_look.PRESETS[DEFAULT_LOOK]
+
+# Fields of `DiskLook` that are properties of the same name.
+LOOK_FIELDS = (
+    "profile",
+    "exponent",
+    "temperature",
+    "doppler_colour",
+    "doppler_brightness",
+    "colour_variation",
+    "falloff",
+    "exposure",
+    "opacity",
+    "streaks",
+    "clumps",
+    "inner_softness",
+    "outer_softness",
+    "gain",
+)
+
+
+def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
+    """Carry a change into the compositors of the scenes that render this hole.
+
+    Every property has an update function: without one, Blender does not carry a script's new value into evaluated
+    data.
+    """
+    from ..outputs.shared import disk_sync  # it reads these properties, hence not at the top
+
+    disk_sync.refresh_hole(settings.id_data)
+
+
+def _amount(name: str, field: str, description: str) -> "bpy.types.FloatProperty":
+    return bpy.props.FloatProperty(
+        name=name,
+        description=description,
+        default=getattr(_LOOK, field),
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_changed,
+    )
+
+
+class UmbraDiskProperties(bpy.types.PropertyGroup):
+    """A thin disk of matter around the hole. The first six decide what is baked, the others how it looks."""
+
+    enabled: bpy.props.BoolProperty(
+        name="Disk",
+        description="Surround the black hole with a glowing disk of matter, in the plane of its rotation",
+        default=False,
+        update=_changed,
+        options=set(),
+    )
+    inner_at_isco: bpy.props.BoolProperty(
+        name="Innermost Orbit",
+        description="The disk begins at the innermost stable circular orbit, where matter starts to fall",
+        default=True,
+        update=_changed,
+        options=set(),
+    )
+    inner_radius: bpy.props.FloatProperty(
+        name="Inner Edge",
+        description="Radius at which the disk begins, in units of M. Inside the innermost stable orbit matter falls",
+        default=6.0,
+        min=0.0,
+        soft_min=1.0,
+        soft_max=50.0,
+        update=_changed,
+    )
+    outer_radius: bpy.props.FloatProperty(
+        name="Outer Edge",
+        description="Radius at which the disk ends, in units of M",
+        default=18.0,
+        min=0.0,
+        soft_min=2.0,
+        soft_max=100.0,
+        update=_changed,
+    )
+    retrograde: bpy.props.BoolProperty(
+        name="Retrograde",
+        description="The disk turns against the hole's rotation; its innermost stable orbit is farther out",
+        default=False,
+        update=_changed,
+        options=set(),
+    )
+    crossings: bpy.props.IntProperty(
+        name="Images",
+        description="How many images of the disk are drawn: the direct one, the one of its far side that is bent "
+        "over and under the shadow, and the thin ring at the shadow's edge",
+        default=physics.DEFAULT_CROSSINGS,
+        min=1,
+        max=MOST_IMAGES,
+        update=_changed,
+        options=set(),
+    )
+    profile: bpy.props.EnumProperty(
+        name="Profile",
+        description="How brightness and temperature change with the radius",
+        items=tuple((*each, number) for number, each in enumerate(PROFILES)),
+        default=_LOOK.profile,
+        update=_changed,
+        options=set(),
+    )
+    exponent: bpy.props.FloatProperty(
+        name="Falloff Power",
+        description="Power of the radius by which the brightness falls",
+        default=_LOOK.exponent,
+        min=0.0,
+        max=20.0,
+        update=_changed,
+    )
+    temperature: bpy.props.FloatProperty(
+        name="Temperature",
+        description="Where the disk is brightest, kelvin: it decides the colour",
+        default=_LOOK.temperature,
+        min=disk_look.COLDEST,
+        max=disk_look.HOTTEST,
+        soft_min=1500.0,
+        soft_max=30_000.0,
+        subtype="COLOR_TEMPERATURE",
+        update=_changed,
+    )
+    doppler_colour: _amount(
+        "Doppler Colour",
+        "doppler_colour",
+        "How much motion and gravity change the disk's colour: 0 not at all, 1 as physics has it",
+    )
+    doppler_brightness: _amount(
+        "Doppler Brightness",
+        "doppler_brightness",
+        "How much motion and gravity change the disk's brightness: 0 not at all, 1 as physics has it, which makes the "
+        "side that comes towards the camera far brighter",
+    )
+    beaming: bpy.props.EnumProperty(
+        name="Light",
+        description="What the brightness counts",
+        items=(
+            ("BOLOMETRIC", "All Light", "The light of all wavelengths: the frequency ratio to the power of 4", 0),
+            ("MONOCHROMATIC", "One Colour", "The light of a narrow band: the frequency ratio to the power of 3", 1),
+        ),
+        default="BOLOMETRIC",
+        update=_changed,
+        options=set(),
+    )
+    colour_variation: _amount(
+        "Colour Variation", "colour_variation", "How much cooler the dim parts are: at 0 the disk has one temperature"
+    )
+    falloff: _amount("Falloff", "falloff", "How far the brightness follows the profile: at 0 it is the same throughout")
+    exposure: bpy.props.FloatProperty(
+        name="Exposure",
+        description="Brightens the disk by this many stops",
+        default=_LOOK.exposure,
+        min=-32.0,
+        max=32.0,
+        soft_min=-8.0,
+        soft_max=8.0,
+        update=_changed,
+    )
+    opacity: _amount("Opacity", "opacity", "How much the densest parts hide what is behind")
+    streaks: _amount("Streaks", "streaks", "How much the streaks thin the disk out")
+    clumps: _amount("Clumps", "clumps", "How much the clumps thin the disk out")
+    inner_softness: _amount("Inner Softness", "inner_softness", "Share of the disk over which its inner edge fades in")
+    outer_softness: _amount("Outer Softness", "outer_softness", "Share of the disk over which its outer edge fades out")
+    gain: bpy.props.FloatProperty(
+        name="Contrast of Light",
+        description="How much brighter dense streaks are than thin ones",
+        default=_LOOK.gain,
+        min=1.0,
+        max=8.0,
+        soft_max=3.0,
+        update=_changed,
+    )
+    turning_speed: bpy.props.FloatProperty(
+        name="Turning Speed",
+        description="How much time passes at the hole in a second of the animation, in units of M (G M / c^3); every "
+        "radius turns with its own orbital speed",
+        default=DEFAULT_SPEED,
+        soft_min=-200.0,
+        soft_max=200.0,
+        update=_changed,
+        options=set(),  # time would jump: it is the frame times this
+    )
+    texture: bpy.props.PointerProperty(
+        name="Texture",
+        description="A picture in place of the built-in streaks: azimuth across, so that it should repeat, and the "
+        "logarithm of the radius from the inner edge at the top",
+        type=bpy.types.Image,
+        update=_changed,
+    )
+    texture_use: bpy.props.EnumProperty(
+        name="Used As",
+        description="What the picture says about the disk",
+        items=(
+            (DENSITY, "Streaks", "How dense it is: red thins it by Streaks, green by Clumps", 0),
+            (COLOUR, "Colour", "Its colours are the disk's own, not those of hot matter; its alpha is the density", 1),
+        ),
+        default=DENSITY,
+        update=_changed,
+        options=set(),
+    )
+    light: bpy.props.BoolProperty(
+        name="Light the Scene",
+        description="Add a glowing disk that lights the scene's objects in Cycles; the camera does not see it",
+        default=False,
+        update=_changed,
+        options=set(),
+    )
+    light_strength: bpy.props.FloatProperty(
+        name="Light Strength",
+        description="Factor of the light that the disk sheds on objects: 1 is that of the disk that is seen",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        update=_changed,
+    )
+    # What depends on the spin, for drivers.
+    innermost_orbit: bpy.props.FloatProperty(
+        name="Innermost Stable Orbit",
+        description="Radius of the innermost stable orbit of the disk's matter, units of M",
+        get=lambda settings: metric.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
+    )
+    flux_factor: bpy.props.FloatProperty(
+        name="Flux Factor",
+        description="By which Page and Thorne's flux becomes 1 where it is largest",
+        # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
+        get=lambda settings: 1.0 / disk_flux.peak_flux(settings.id_data.umbra.spin, settings.retrograde),
+    )
+
+
+def shows_picture(settings: UmbraDiskProperties) -> bool:
+    """Whether the disk has the colours of the artist's picture."""
+    return settings.texture is not None and settings.texture_use == COLOUR
+
+
+def disk_of(settings: UmbraDiskProperties) -> "physics.Disk | None":
+    """The disk whose passes are baked, or None."""
+    if not settings.enabled:
+        return None
+    return physics.Disk(
+        crossings=int(settings.crossings),
+        inner_radius=None if settings.inner_at_isco else float(settings.inner_radius),
+        outer_radius=float(settings.outer_radius),
+        retrograde=bool(settings.retrograde),
+    )
+
+
+def look_of(settings: UmbraDiskProperties) -> "disk_look.DiskLook":
+    """How the disk looks."""
+    values = {name: getattr(settings, name) for name in LOOK_FIELDS}
+    return disk_look.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+
+
+def use_look(settings: UmbraDiskProperties, look: "disk_look.DiskLook") -> None:
+    """Set all properties of the look."""
+    for name in LOOK_FIELDS:
+        if getattr(settings, name) != getattr(look, name):
+            setattr(settings, name, getattr(look, name))
+    settings.beaming = next(name for name, power in BEAMINGS.items() if power == look.beaming)
+
+
+CLASSES = (UmbraDiskProperties,)

@@ -1,0 +1,384 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist sets and Blender saves: the hole on its object, the rendering of it on the scene."""
+
+import bpy
+
+from ..core.physics_api import color, lens, metric, physics
+from . import disk_properties
+
+# physics accepts spins up to this; a hole spinning the other way is the object turned over.
+LARGEST_SPIN = 0.9999
+
+# With Blender's default camera, the shadow then fills most of the picture's height.
+DEFAULT_MASS_SCALE = 0.35
+
+# Blender draws Empties no smaller (scene units).
+SMALLEST_DISPLAY = 1e-4
+
+CAMERA_ANIMATION = "CAMERA_ANIMATION"
+
+# Identifiers are saved in files: Blender's enum -> the physics' name of the same motion.
+MOTIONS = {
+    "FIDO": "fido",
+    "STATIC": "static",
+    "CIRCULAR": "circular",
+    "CIRCULAR_RETROGRADE": "circular_retrograde",
+    "FREE_FALL": "free_fall",
+    CAMERA_ANIMATION: "velocity",
+}
+
+# Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
+ACCURACIES = {
+    "DRAFT": (1e-4, 1e-4),
+    "STANDARD": (physics.DEFAULT_TOLERANCE, physics.DEFAULT_INTERPOLATION),
+    "REFERENCE": (1e-11, 0.0),
+}
+
+# What becomes of the hole: identifiers that are saved in files.
+COMPOSITOR, CYCLES_LENS, WORLD = "COMPOSITOR", "CYCLES_LENS", "WORLD"
+EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
+
+# Blender saves an enum's number, so a method keeps the one it has here.
+METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
+
+
+def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
+    """Draw the Empty's sphere at the size of the horizon.
+
+    Every property has this as its update function, also where the sphere stays the same: without one, Blender
+    does not carry a script's new value into evaluated data.
+    """
+    hole = settings.id_data
+    if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
+        hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
+    if settings.disk.enabled:  # its innermost orbit depends on the spin, and its light on the size
+        from ..outputs.shared import disk_sync  # it reads these properties, hence not at the top
+
+        disk_sync.refresh_hole(hole)
+
+
+class UmbraHoleProperties(bpy.types.PropertyGroup):
+    """A black hole. Its place, axis (local Z) and size are those of the object."""
+
+    is_black_hole: bpy.props.BoolProperty(
+        name="Black Hole",
+        description="This object is a black hole: its origin is the centre, its local Z the axis of rotation",
+        default=False,
+        update=_changed,
+        options=set(),
+    )
+    spin: bpy.props.FloatProperty(
+        name="Spin",
+        description="How fast the hole rotates: 0 does not rotate, 1 would be the fastest possible. "
+        "The shadow is flattened on the side that turns towards the camera",
+        default=0.9,
+        min=0.0,
+        max=LARGEST_SPIN,
+        precision=4,
+        step=1,
+        update=_changed,
+    )
+    mass_scale: bpy.props.FloatProperty(
+        name="Size of 1 M",
+        description="Length of one gravitational radius (G M / c^2) in scene units, before the object's own "
+        "scale. The shadow is about ten of these across",
+        default=DEFAULT_MASS_SCALE,
+        min=1e-9,
+        soft_min=0.001,
+        soft_max=100.0,
+        precision=4,
+        unit="LENGTH",
+        update=_changed,
+    )
+    motion: bpy.props.EnumProperty(
+        name="Camera Motion",
+        description="How the camera moves: this shifts directions (aberration) and colours (Doppler effect)",
+        items=(
+            (
+                "FIDO",
+                "Carried by Space",
+                "Held in place, and carried round by the hole's rotation (the local fiducial observer)",
+            ),
+            ("STATIC", "At Rest", "At rest against the stars; impossible inside the ergosphere"),
+            (
+                "CIRCULAR",
+                "Circular Orbit",
+                "Abreast of the circular orbit of the same radius that runs with the hole's rotation",
+            ),
+            (
+                "CIRCULAR_RETROGRADE",
+                "Circular Orbit, Retrograde",
+                "Abreast of the circular orbit of the same radius that runs against the hole's rotation",
+            ),
+            ("FREE_FALL", "Free Fall", "Falling in, from rest at infinity"),
+            (
+                CAMERA_ANIMATION,
+                "Camera Animation",
+                "As the camera's own animation moves it in the scene, "
+                "measured at each frame against the speed of light set below",
+            ),
+        ),
+        default="FIDO",
+        update=_changed,
+    )
+    speed_of_light: bpy.props.FloatProperty(
+        name="Speed of Light",
+        description="Scene units that light covers in a second; the camera's speed is measured against it",
+        default=100.0,
+        min=1e-6,
+        soft_min=0.1,
+        soft_max=1e5,
+        precision=3,
+        update=_changed,
+    )
+    disk: bpy.props.PointerProperty(type=disk_properties.UmbraDiskProperties)
+
+
+def _is_hole(_settings: object, candidate: bpy.types.Object) -> bool:
+    return candidate.umbra.is_black_hole
+
+
+class UmbraSceneProperties(bpy.types.PropertyGroup):
+    """How a scene's black hole is rendered."""
+
+    active_hole: bpy.props.PointerProperty(
+        name="Black Hole",
+        description="The black hole that is rendered; one a scene",
+        type=bpy.types.Object,
+        poll=_is_hole,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    output: bpy.props.EnumProperty(
+        name="Output",
+        description="How the black hole comes into the picture",
+        items=(
+            (COMPOSITOR, "Compositor", "The sky is bent behind the render: every engine, and a new sky costs nothing"),
+            (
+                CYCLES_LENS,
+                "Cycles Lens",
+                "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole",
+            ),
+            (
+                WORLD,
+                "World",
+                "The World itself is bent: in the viewport too, in Cycles and EEVEE, with its light and reflections",
+            ),
+        ),
+        default=COMPOSITOR,
+        update=lambda settings, _context: _output_changed(settings),
+        options=set(),
+    )
+    lens_rays: bpy.props.EnumProperty(
+        name="Rays",
+        description="Where the camera takes its bent rays from when rendering",
+        items=(
+            (EXIT_MAP, "Exit Map", "From a baked map, where it holds; beside the shadow the camera traces them itself"),
+            (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render"),
+        ),
+        default=EXIT_MAP,
+        options=set(),
+    )
+    sphere_radius: bpy.props.FloatProperty(
+        name="Lens Sphere",
+        description="Radius, in M, of the sphere around the hole where bent rays begin. Objects are seen outside of it "
+        "only; the rest of the picture does not depend on it",
+        default=lens.DEFAULT_SPHERE_RADIUS,
+        min=2.0,
+        soft_min=5.0,
+        soft_max=50.0,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    redshift_colour: bpy.props.FloatProperty(
+        name="Redshift Colour",
+        description="How much the change of frequency changes colours: 0 not at all, 1 as physics has it",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=lambda settings, _context: _refresh(settings),
+    )
+    redshift_brightness: bpy.props.FloatProperty(
+        name="Redshift Brightness",
+        description="How much the change of frequency changes brightness: 0 not at all, 1 as physics has it",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=lambda settings, _context: _refresh(settings),
+    )
+    sky_temperature: bpy.props.FloatProperty(
+        name="Sky Temperature",
+        description="Temperature of the light, in kelvin, that the colour shift assumes",
+        default=color.DEFAULT_TEMPERATURE,
+        min=500.0,
+        soft_max=40000.0,
+        max=1e6,
+        step=10000,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    live_preview: bpy.props.BoolProperty(
+        name="Live Preview",
+        description="The viewport's sky and the thumbnail follow while you move the camera or the hole",
+        default=False,
+        update=lambda settings, _context: _preview_changed(settings),
+        options=set(),
+    )
+    foreground: bpy.props.PointerProperty(
+        name="Foreground",
+        description="Collection of the objects that are shown unlensed in front of the hole",
+        type=bpy.types.Collection,
+    )
+    foreground_scene: bpy.props.PointerProperty(
+        name="Foreground Scene",
+        description="Scene of the unbent camera that renders the foreground",
+        type=bpy.types.Scene,
+    )
+    cpu_fallback: bpy.props.BoolProperty(
+        name="CPU if the GPU Cannot",
+        description="Render on the CPU when the GPU cannot run camera shaders. Switched off, that is an error",
+        default=True,
+        options=set(),
+    )
+    map_folder: bpy.props.StringProperty(
+        name="Warp Maps",
+        description="Folder of the warp maps, one file a frame. // means beside the .blend file; a file that "
+        "is not saved yet uses a temporary folder",
+        default="//umbra_maps/",
+        subtype="DIR_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        update=lambda settings, _context: _refresh(settings),
+    )
+    supersampling: bpy.props.EnumProperty(
+        name="Samples",
+        description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples "
+        "smooth the finest images of the sky beside it",
+        items=(
+            ("1", "1 x 1", "One ray a pixel"),
+            ("2", "2 x 2", "Four rays a pixel"),
+            ("4", "4 x 4", "Sixteen rays a pixel"),
+        ),
+        default="1",
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
+    quality: bpy.props.EnumProperty(
+        name="Accuracy",
+        description="How exactly the map is made: the error of direction allowed",
+        items=(
+            ("DRAFT", "Draft", "1e-4 radians, a tenth of a pixel or so: for trying things out"),
+            (
+                "STANDARD",
+                "Standard",
+                f"{physics.DEFAULT_INTERPOLATION:g} radians, a hundredth of a pixel or less: for final pictures",
+            ),
+            ("REFERENCE", "Reference", "Every pixel is traced, as exactly as the arithmetic allows: slow"),
+            ("CUSTOM", "Custom", "Tolerances of your own"),
+        ),
+        default="STANDARD",
+        options=set(),
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Error of direction allowed to the tracing of a ray, radians",
+        default=physics.DEFAULT_TOLERANCE,
+        min=1e-13,
+        max=1e-2,
+        precision=10,
+        options=set(),
+    )
+    interpolation: bpy.props.FloatProperty(
+        name="Interpolation",
+        description="Error of direction allowed where the sky is smooth and rays are interpolated, radians. "
+        "0 traces every pixel",
+        default=physics.DEFAULT_INTERPOLATION,
+        min=0.0,
+        max=1e-2,
+        precision=10,
+        options=set(),
+    )
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the rays are traced",
+        items=tuple(
+            (each.name, each.label, each.description, METHOD_NUMBERS[each.name]) for each in physics.METHODS.values()
+        ),
+        default=physics.DEFAULT_METHOD,
+        options=set(),
+    )
+    environment_source: bpy.props.EnumProperty(
+        name="Sky",
+        description="What the sky around the hole is made of",
+        items=(
+            (
+                "WORLD",
+                "World",
+                "The Environment Texture of the scene's World, with its rotation and strength",
+            ),
+            ("IMAGE", "Image", "An equirectangular image chosen here"),
+        ),
+        default="WORLD",
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
+    environment_image: bpy.props.PointerProperty(
+        name="Sky Image",
+        description="An equirectangular picture of the whole sky",
+        type=bpy.types.Image,
+        update=lambda settings, _context: _refresh(settings),
+    )
+    auto_bake: bpy.props.BoolProperty(
+        name="Bake When Rendering",
+        description="Rendering bakes by itself each warp map that is missing or out of date. Switched off, "
+        "such a frame is an error",
+        default=True,
+        options=set(),
+    )
+
+
+def _refresh(settings: UmbraSceneProperties) -> None:
+    """Carry a change into the compositor or the camera, where the set-up is in place."""
+    from ..outputs.compositor import compositor_sync
+    from ..outputs.lens import lens_sync
+    from ..outputs.shared import disk_sync
+    from ..outputs.world import world_sync  # they read these properties, hence not at the top
+
+    scene = settings.id_data
+    if isinstance(scene, bpy.types.Scene) and compositor_sync.find_setup(scene) is not None:
+        compositor_sync.refresh(scene)
+    if isinstance(scene, bpy.types.Scene) and settings.output == CYCLES_LENS:
+        lens_sync.show_live(scene)
+        disk_sync.refresh_or_warn(scene)
+    if isinstance(scene, bpy.types.Scene) and settings.output == WORLD:
+        world_sync.refresh(scene)
+
+
+def _output_changed(settings: UmbraSceneProperties) -> None:
+    from ..outputs import switching as output  # it reads these properties, hence not at the top
+
+    output.on_switched(settings.id_data)
+
+
+def _preview_changed(settings: UmbraSceneProperties) -> None:
+    from ..preview import live_preview as preview  # it reads these properties, hence not at the top
+
+    preview.on_switched(settings.id_data)
+
+
+def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:
+    """The errors of direction allowed to tracing and to interpolation, radians, from the chosen accuracy."""
+    return ACCURACIES.get(settings.quality, (settings.tolerance, settings.interpolation))
+
+
+CLASSES = (*disk_properties.CLASSES, UmbraHoleProperties, UmbraSceneProperties)
+
+
+def register() -> None:
+    """Attach the properties to objects and scenes."""
+    bpy.types.Object.umbra = bpy.props.PointerProperty(type=UmbraHoleProperties)
+    bpy.types.Scene.umbra = bpy.props.PointerProperty(type=UmbraSceneProperties)
+
+
+def unregister() -> None:
+    """Take the properties off again; their values stay in the file."""
+    del bpy.types.Scene.umbra
+    del bpy.types.Object.umbra

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a map's file is what it should be, and if not, what is the matter with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from ..images.exr import PathLike, read_exr_header
+from ..images.exr_header import MAGIC
+from ..numerics.errors import ImageFileError, WarpMapError
+from . import disk_pass_file, exit_map_file, warp_map_file, world_map_file
+from .map_file import ATTRIBUTE_FORMAT, MapFormat
+
+# Readers that check every pixel, by the format that they read.
+READERS: dict[MapFormat, Callable[[PathLike], object]] = {
+    warp_map_file.FORMAT: warp_map_file.read_warp_map,
+    exit_map_file.FORMAT: exit_map_file.read_exit_map,
+    world_map_file.FORMAT: world_map_file.read_world_map,
+    disk_pass_file.FORMAT: disk_pass_file.read_disk_pass,
+}
+
+
+class State(StrEnum):
+    """What a map's file is."""
+
+    VALID = "valid"
+    MISSING = "missing"
+    STALE = "stale"
+    """Whole, but made from other settings or by another version."""
+    FOREIGN = "foreign"
+    """Not one of ours, or of another kind."""
+    DAMAGED = "damaged"
+    """Cut short, or changed since it was written."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found out about a file."""
+
+    state: State
+    fault: str = ""
+    """What is the matter, as the beginning of a sentence; empty if nothing is."""
+
+
+def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, thorough: bool = True) -> Finding:
+    """Find out what a map's file is.
+
+    Parameters
+    ----------
+    path : path
+    kind : MapFormat
+        What the file should be.
+    wanted : str, optional
+        The hash of the parameters that it should be made from; without it, any will do.
+    thorough : bool
+        Read the pixels too (some 0.1 s in full HD) and check them; otherwise the header is taken at its word.
+
+    Returns
+    -------
+    Finding
+        Nothing that is wrong with a file is raised.
+    """
+    path = Path(path)
+    noun = kind.noun.partition(" ")[2]
+    if not path.exists():
+        return Finding(State.MISSING, f"The {noun} {path} is missing")
+    try:
+        with path.open("rb") as stream:
+            magic = stream.read(len(MAGIC))
+        if len(magic) == len(MAGIC) and magic != MAGIC:
+            return Finding(State.FOREIGN, f"{path} is not an OpenEXR file")
+        stamp = read_exr_header(path).get(ATTRIBUTE_FORMAT)
+        if stamp_kind(stamp) is not kind:
+            return Finding(State.FOREIGN, f"{path} is not {kind.noun}")
+        if stamp != kind.stamp:
+            return Finding(State.STALE, f"{path} is {kind.noun} of another version ({stamp})")
+        metadata = kind.read_metadata(path)
+        if wanted is not None and metadata["hash"] != wanted:
+            return Finding(State.STALE, f"The {noun} {path} is out of date")
+        if thorough:
+            READERS[kind](path)
+    except (ImageFileError, WarpMapError) as error:
+        return Finding(State.DAMAGED, str(error).removesuffix("; bake it again.").removesuffix("."))
+    except IsADirectoryError:
+        return Finding(State.FOREIGN, f"{path} is a folder")
+    except OSError as error:
+        return Finding(State.DAMAGED, f"Cannot read {path}: {(error.strerror or str(error)).lower()}")
+    return Finding(State.VALID)
+
+
+def stamp_kind(stamp: object) -> MapFormat | None:
+    """Return the format that a header's stamp belongs to, of whatever version; None if it is none of ours."""
+    if not isinstance(stamp, str):
+        return None
+    return next((kind for kind in READERS if stamp.startswith(kind.name + " ")), None)

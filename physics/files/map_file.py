@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the EXR files of warp maps, exit maps and disk passes share: a header that says all, and its checks."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..images.exr import PathLike, read_channels, read_exr_header, write_channels
+from ..numerics.errors import ImageFileError, WarpMapError
+from ..shot.map_parameters import WarpMapParameters
+
+CHANNELS = ("R", "G", "B", "A")
+
+# Header attributes, all strings.
+ATTRIBUTE_FORMAT = "umbraFormat"
+ATTRIBUTE_HASH = "umbraHash"
+ATTRIBUTE_COUNTS = "umbraCounts"
+ATTRIBUTE_PARAMETERS = "umbraParameters"
+ATTRIBUTE_CHECKSUM = "umbraChecksum"
+
+Planes = Sequence[NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class MapFormat:
+    """One kind of map file."""
+
+    name: str
+    """What `umbraFormat` begins with."""
+    version: int
+    noun: str
+    """What a message calls it, with its article."""
+    comments: str
+    """What the channels are, for whoever opens the file elsewhere."""
+    pictures: int = 1
+    """Pictures of the map's size that the file holds, one below the other."""
+    attributes: tuple[str, ...] = ()
+    """Further header attributes, strings, that the kind has."""
+
+    @property
+    def stamp(self) -> str:
+        """The whole value of `umbraFormat`."""
+        return f"{self.name} {self.version}"
+
+    def write(self, path: PathLike, planes: Planes, metadata: Mapping[str, Any], further: Sequence[str] = ()) -> None:
+        """Write R, G, B and A, float32 of one shape each, with their header, whole or not at all.
+
+        `further` are the values of `attributes`.
+
+        Raises
+        ------
+        ImageFileError
+            When the file cannot be written.
+        """
+        write_channels(
+            path,
+            dict(zip(CHANNELS, planes, strict=True)),
+            {
+                ATTRIBUTE_FORMAT: self.stamp,
+                ATTRIBUTE_HASH: metadata["hash"],
+                ATTRIBUTE_COUNTS: json.dumps(metadata["counts"]),
+                ATTRIBUTE_PARAMETERS: json.dumps(metadata["parameters"]),
+                ATTRIBUTE_CHECKSUM: checksum(planes),
+                "comments": self.comments,
+                **dict(zip(self.attributes, further, strict=True)),
+            },
+        )
+
+    def read(self, path: PathLike) -> tuple[list[NDArray[Any]], dict[str, Any]]:
+        """Read the four channels and the metadata, further attributes included; header and checksum are checked.
+
+        Raises
+        ------
+        WarpMapError
+            When the file is missing, damaged, cut short, or of another kind; the message names it and says which.
+        """
+        try:
+            channels, header = read_channels(path)
+        except ImageFileError as error:
+            raise WarpMapError(advice(str(error))) from error
+        metadata = self._metadata(path, header)
+        planes = [channels[name] for name in CHANNELS if name in channels]
+        if len(planes) != len(CHANNELS) or checksum(planes) != header.get(ATTRIBUTE_CHECKSUM):
+            raise WarpMapError(advice(f"{path} is damaged: its pixels are not those that were written."))
+        return planes, metadata
+
+    def read_metadata(self, path: PathLike) -> dict[str, Any]:
+        """Read the metadata from the header alone.
+
+        Raises
+        ------
+        WarpMapError
+            When the file is missing, its header is damaged, or it is of another kind.
+        """
+        try:
+            header = read_exr_header(path)
+        except ImageFileError as error:
+            raise WarpMapError(advice(str(error))) from error
+        return self._metadata(path, header)
+
+    def _metadata(self, path: PathLike, header: Mapping[str, Any]) -> dict[str, Any]:
+        stamp = header.get(ATTRIBUTE_FORMAT)
+        if not isinstance(stamp, str) or not stamp.startswith(self.name + " "):
+            raise WarpMapError(advice(f"{Path(path)} is not {self.noun}."))
+        if stamp != self.stamp:
+            raise WarpMapError(advice(f"{Path(path)} is {self.noun} of another version ({stamp})."))
+        try:
+            parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
+            counts = json.loads(header[ATTRIBUTE_COUNTS])
+            width, height = WarpMapParameters.from_metadata(parameters).map_size
+            readable = isinstance(counts["unresolved"], int) and all(type(each) is int for each in counts.values())
+            identity = str(header[ATTRIBUTE_HASH])
+        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read.")) from error
+        if not readable:
+            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read."))
+        if list(header["size"]) != [width, height * self.pictures]:
+            raise WarpMapError(advice(f"{Path(path)} is damaged: its size is not that of its parameters."))
+        further = {name: str(header.get(name, "")) for name in self.attributes}
+        return {"format": stamp, "hash": identity, "counts": counts, "parameters": parameters, **further}
+
+
+def checksum(planes: Planes) -> str:
+    """Return the CRC-32 of the channels' bytes, one after another."""
+    value = 0
+    for plane in planes:
+        value = zlib.crc32(np.ascontiguousarray(plane, dtype="<f4").data, value)
+    return f"crc32 {value:08x}"
+
+
+def advice(sentence: str) -> str:
+    """Return what a reader of a faulty file is told."""
+    return f"{sentence.removesuffix('.')}; bake it again."

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and writing OpenEXR files; the one module that knows the OpenEXR package."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.errors import ImageFileError
+from . import exr_header
+
+
+@contextlib.contextmanager
+def _own_symbols() -> Iterator[None]:
+    """Let a library that is loaded within the block call its own functions before others of the same names.
+
+    Blender's executable has an OpenEXR of its own among its global symbols, of another version than the wheel's.
+    Calling that one crashes Blender 4.5. Only glibc has the flag; macOS and Windows bind each library to its own
+    symbols anyway.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    flags = sys.getdlopenflags()
+    sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(flags)
+
+
+with _own_symbols():
+    import OpenEXR
+
+PathLike = str | os.PathLike[str]
+
+# Names of files that are being written, or that a process was writing when it was killed.
+_TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.tmp(\.[^.]+)")
+
+# Header attributes that describe how a file is stored rather than what it is about.
+STRUCTURAL_ATTRIBUTES = frozenset(
+    "channels compression dataWindow displayWindow lineOrder pixelAspectRatio screenWindowCenter screenWindowWidth "
+    "type name version chunkCount tiles".split()
+)
+
+
+# More threads than this bring little: the checksum and the disk remain.
+MOST_THREADS = 8
+
+_library = threading.Lock()
+
+
+@contextlib.contextmanager
+def _library_threads() -> Iterator[None]:
+    """Let OpenEXR compress on all cores, for as long as the block lasts; one block at a time.
+
+    Its threads are ended again: left alive, they would have to be ended while the process ends, in any order.
+    """
+    set_count = getattr(OpenEXR, "set_global_thread_count", None)  # 3.3 has none
+    if set_count is None:
+        yield
+        return
+    with _library:
+        set_count(min(os.cpu_count() or 1, MOST_THREADS))
+        try:
+            yield
+        finally:
+            set_count(0)
+
+
+@contextlib.contextmanager
+def replacing(path: PathLike) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place when the block ends without an error.
+
+    A reader, or a crash, meets the old file or the new one whole, never a half.
+
+    Raises
+    ------
+    ImageFileError
+        When the folder cannot be made or written, or the disk is full.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
+        os.close(handle)
+    except OSError as error:
+        raise ImageFileError(f"Cannot write {target}: {_reason(error)}; choose another folder.") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp makes files that only their owner can read; a map is as public as its folder allows.
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise ImageFileError(
+            f"Cannot write {target}: {_reason(error)}; free some space or choose another folder."
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def target_of(name: str) -> str | None:
+    """Return the name of the file that a temporary one of `replacing` was to become; None for any other name."""
+    match = _TEMPORARY.fullmatch(name)
+    return None if match is None else match[1] + match[2]
+
+
+def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str] | None = None) -> None:
+    """Write an image as a scanline EXR with lossless ZIP compression, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be.
+    pixels : ndarray of float16 or float32, shape (height, width, 3 or 4)
+        R, G, B(, A), row 0 at the top.
+    attributes : mapping, optional
+        Strings for the header.
+
+    Raises
+    ------
+    ImageFileError
+        When the file cannot be written.
+    """
+    names = "RGBA"[: pixels.shape[2]]
+    write_channels(path, {name: np.ascontiguousarray(pixels[:, :, i]) for i, name in enumerate(names)}, attributes)
+
+
+def write_channels(
+    path: PathLike, channels: Mapping[str, NDArray[Any]], attributes: Mapping[str, str] | None = None
+) -> None:
+    """Write channels, arrays of float16 or float32 of one shape (height, width), as `write_exr` does.
+
+    Raises
+    ------
+    ImageFileError
+        When the file cannot be written.
+    """
+    header = {
+        **(attributes or {}),
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+    }
+    expected = None
+    with replacing(path) as temporary:
+        try:
+            with _library_threads(), OpenEXR.File(header, dict(channels)) as file:
+                file.write(str(temporary))
+            expected = temporary.stat().st_size
+        except RuntimeError as error:
+            raise OSError(f"the EXR writer failed ({error})") from error
+        if not expected:
+            raise OSError("no space left on the device")
+
+
+def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Read an EXR file's R, G, B(, A) as float32, shape (height, width, 3 or 4), row 0 at the top, and its header.
+
+    Luminance-only files are read as grey.
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing, damaged or holds no picture.
+    """
+    channels, header = read_channels(path)
+    if "Y" in channels and "R" not in channels:
+        channels = dict.fromkeys("RGB", channels["Y"]) | {k: v for k, v in channels.items() if k == "A"}
+    names = [name for name in "RGBA" if name in channels]
+    if names[:3] != ["R", "G", "B"]:
+        raise ImageFileError(f"{path} has no channels R, G and B; it is not a picture that can be used here.")
+    return np.stack([np.asarray(channels[name], dtype=np.float32) for name in names], axis=-1), header
+
+
+def read_channels(path: PathLike) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read an EXR file's channels as they are, shape (height, width) each, row 0 at the top, and its header.
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing or damaged.
+    """
+    with _library_threads(), _opened(path, header_only=False) as file:
+        return {name: channel.pixels for name, channel in file.channels().items()}, _attributes(file)
+
+
+def read_exr_header(path: PathLike) -> dict[str, Any]:
+    """Read an EXR file's header alone: attributes by name, with ``size`` as (width, height).
+
+    Raises
+    ------
+    ImageFileError
+        When the file is missing or its header is damaged.
+    """
+    with _opened(path, header_only=True) as file:
+        return _attributes(file)
+
+
+@contextlib.contextmanager
+def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
+    try:
+        data = Path(path).read_bytes() if not header_only else None
+        with io.BytesIO(data) if data is not None else open(path, "rb") as stream:
+            size = stream.seek(0, os.SEEK_END)
+            stream.seek(0)
+            exr_header.check(stream, size, whole=not header_only)
+    except FileNotFoundError as error:
+        raise ImageFileError(f"{path} does not exist.") from error
+    except OSError as error:
+        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.") from error
+    except exr_header.BadHeader as error:
+        raise ImageFileError(f"{path} {error}.") from error
+    try:
+        source: Any = str(path) if data is None else io.BytesIO(data)
+        with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:
+            yield file
+    except (RuntimeError, ValueError, TypeError, MemoryError, UnicodeDecodeError) as error:
+        if isinstance(error, ImageFileError):
+            raise
+        detail = str(error).strip() or type(error).__name__
+        raise ImageFileError(f"{path} is damaged or cut short: {detail}.") from error
+
+
+def _attributes(file: OpenEXR.File) -> dict[str, Any]:
+    header = file.header()
+    (left, top), (right, bottom) = (tuple(int(value) for value in corner) for corner in header["dataWindow"])
+    kept = {name: value for name, value in header.items() if name not in STRUCTURAL_ATTRIBUTES}
+    return {**kept, "size": (right - left + 1, bottom - top + 1)}
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Warp maps: for each pixel, where in the sky its light comes from, how far it is shifted, and how much is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..disk_passes.disk_painting import DiskPainting
+from ..disk_passes.disk_pass import DiskPass
+from ..geodesics.tracer import Cancel, Progress, drain
+from ..sampling.view import View
+from ..shot.map_parameters import WarpMapParameters
+from .painting import Painting
+from .sky_table import SkyTable
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class WarpMap:
+    """A warp map in memory; images of shape (height, width), row 0 at the top of the picture."""
+
+    theta: Image
+    """Angle from the world's z axis of the direction the light comes from, radians, [0, pi]."""
+    phi: Image
+    """Azimuth of that direction about the world's z axis, from x, radians, [0, 2 pi)."""
+    one_plus_z: Image
+    """f_source / f_camera for a source at rest at infinity; > 1 is redshift; never 0."""
+    visibility: Image
+    """Share of the pixel that sees the sky, 0 to 1."""
+    metadata: dict[str, Any]
+    """What the file's header says: ``format``, ``hash``, ``counts`` and ``parameters``."""
+    disk_passes: tuple[DiskPass, ...] = ()
+    """The disk's images, the first crossing first, where it was baked with a disk; they have files of their own."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``.
+
+        And ``rays`` that were traced for them, and ``shared``, rays that an earlier map or a table stood for.
+        """
+        counts: dict[str, int] = self.metadata["counts"]
+        return counts
+
+
+def bake(parameters: WarpMapParameters, *, progress: Progress | None = None, cancel: Cancel | None = None) -> WarpMap:
+    """Trace a warp map.
+
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+    progress : callable, optional
+        Called with the fraction done, 0 to 1, after each block of rays.
+    cancel : callable, optional
+        Asked before each block; true ends the work.
+
+    Raises
+    ------
+    BlackHoleError
+        When no map can be made from these parameters.
+    Cancelled
+        When `cancel` returned true.
+    """
+    return drain(bake_steps(parameters), progress, cancel)
+
+
+def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> Generator[float, None, WarpMap]:
+    """Trace a warp map step by step: yields the fraction done after each block of rays, returns the map.
+
+    A table of the same place, see `SkyTable.serves`, stands for most of the rays.
+
+    The steps take some tens of milliseconds each, so that a window can be kept alive between them.
+
+    Raises
+    ------
+    BlackHoleError
+        Before the first step, when no map can be made from these parameters.
+    """
+    parameters.validate()
+    view = View(parameters)
+    painting = Painting(parameters, table, view)
+    metadata: dict[str, Any] = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
+    if parameters.disk is None:
+        yield from painting.steps()
+        return WarpMap(*painting.planes, {**metadata, "counts": painting.counts()})
+    for fraction in painting.steps():
+        yield 0.5 * fraction
+    disk = DiskPainting(parameters, view)
+    for fraction in disk.steps():
+        yield 0.5 + 0.5 * fraction
+    metadata["counts"] = {**painting.counts(), **disk.counts()}
+    return WarpMap(*painting.planes, metadata, disk.passes(metadata))

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numpy's own picture of a warp map over an equirectangular environment, in float64.
+
+This is the statement of what a picture is, written as plainly as possible: the compositor's node group is
+judged against it pixel by pixel, and the command line renders with it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..light.color import DEFAULT_TEMPERATURE, redshift_gain
+from ..numerics.errors import BlackHoleError
+from ..numerics.sphere import unit_vectors
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+MAGENTA = (1.0, 0.0, 1.0)
+"""Colour of pixels that no valid warp map can hold."""
+
+SMALLEST_ONE_PLUS_Z = 1e-6
+LARGEST_ONE_PLUS_Z = 1e6
+"""Frequency ratios outside these bounds are not trusted: no camera that can be placed sees them."""
+
+ANGLE_SLACK = 1e-5
+"""float32 cannot write pi and 2 pi exactly; angles out of range by more than this (radians) are foreign."""
+
+
+HALVE_ABOVE = 3.0
+"""Ratio of widths above which `resize` halves a picture before it interpolates."""
+
+
+class WarpMapLike(Protocol):
+    """Anything with the four channels of a warp map, each of shape (height, width), row 0 at the top."""
+
+    @property
+    def theta(self) -> NDArray[np.float32]:
+        """Polar angle (radians) the light comes from."""
+
+    @property
+    def phi(self) -> NDArray[np.float32]:
+        """Azimuth (radians) the light comes from."""
+
+    @property
+    def one_plus_z(self) -> NDArray[np.float32]:
+        """Frequency ratio source / camera."""
+
+    @property
+    def visibility(self) -> NDArray[np.float32]:
+        """Share of the pixel that sees the sky, 0..1."""
+
+
+@dataclass(frozen=True)
+class ReferencePicture:
+    """The four results of a reference rendering, row 0 at the top.
+
+    Attributes
+    ----------
+    image : ndarray, shape (height, width, 4)
+        Foreground over sky, alpha 1.
+    sky : ndarray, shape (height, width, 4)
+        The sky alone with the hole in it, alpha 1.
+    shadow : ndarray, shape (height, width)
+        Share of each pixel that the hole hides, 0..1; 0 where the map is invalid.
+    redshift : ndarray, shape (height, width)
+        1 + z averaged over the pixel; 1 where the map is invalid.
+    """
+
+    image: FloatArray
+    sky: FloatArray
+    shadow: FloatArray
+    redshift: FloatArray
+
+
+def rotation_matrix(euler: ArrayLike) -> FloatArray:
+    """Rotation of Blender's Mapping node (type Point) for XYZ Euler angles.
+
+    Parameters
+    ----------
+    euler : array_like, shape (3,)
+        Angles about x, y and z in radians; applied in this order about fixed axes.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        R = Rz Ry Rx: the direction to look up is R d.
+    """
+    angle_x, angle_y, angle_z = (float(angle) for angle in np.asarray(euler, dtype=np.float64))
+    cx, sx = math.cos(angle_x), math.sin(angle_x)
+    cy, sy = math.cos(angle_y), math.sin(angle_y)
+    cz, sz = math.cos(angle_z), math.sin(angle_z)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    matrix: FloatArray = about_z @ about_y @ about_x
+    return matrix
+
+
+def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatArray:
+    """Bilinear look-up of an equirectangular picture, in the convention of Blender's World.
+
+    Parameters
+    ----------
+    environment : array_like, shape (rows, columns, channels)
+        Row 0 at the top (the zenith, +z), the middle column towards +x. Texel centres at (i + 0.5) / N.
+    directions : array_like, shape (..., 3)
+        Directions to look along; they need not be of unit length.
+
+    Returns
+    -------
+    ndarray, shape (..., channels)
+        u = 0.5 - atan2(y, x) / (2 pi) wraps round; v = 0.5 + asin(z) / pi ends at the poles, where the first
+        and last row are extended.
+    """
+    picture: FloatArray = np.asarray(environment, dtype=np.float64)
+    looking: FloatArray = np.asarray(directions, dtype=np.float64)
+    rows, columns = picture.shape[:2]
+    x, y, z = looking[..., 0], looking[..., 1], looking[..., 2]
+    u = 0.5 - np.arctan2(y, x) / (2.0 * np.pi)
+    # By atan2: equal to pi/2 - asin(z), but it keeps its digits at the poles, where asin loses half of them.
+    polar = np.arctan2(np.hypot(x, y), z)
+    column = u * columns - 0.5
+    row = polar / np.pi * rows - 0.5
+    left, top = np.floor(column), np.floor(row)
+    share_x, share_y = (column - left)[..., np.newaxis], (row - top)[..., np.newaxis]
+    left_index = left.astype(np.int64) % columns
+    right_index = (left_index + 1) % columns
+    top_index = np.clip(top.astype(np.int64), 0, rows - 1)
+    bottom_index = np.clip(top.astype(np.int64) + 1, 0, rows - 1)
+    upper = picture[top_index, left_index] * (1.0 - share_x) + picture[top_index, right_index] * share_x
+    lower = picture[bottom_index, left_index] * (1.0 - share_x) + picture[bottom_index, right_index] * share_x
+    colours: FloatArray = upper * (1.0 - share_y) + lower * share_y
+    return colours
+
+
+def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:
+    """Pixels that no valid warp map can hold, shape (height, width): NaN, or a channel out of its range."""
+    theta, phi, one_plus_z, visibility = _channels(warp_map)
+    # Written as "not inside", so that NaN, which compares false with everything, counts as invalid.
+    inside = (
+        _within(theta, 0.0, np.pi)
+        & _within(phi, 0.0, 2.0 * np.pi)
+        & _within(visibility, 0.0, 1.0)
+        & (one_plus_z > SMALLEST_ONE_PLUS_Z)
+        & (one_plus_z < LARGEST_ONE_PLUS_Z)
+    )
+    invalid: BoolArray = np.logical_not(inside)
+    return invalid
+
+
+def resize(image: ArrayLike, output_size: tuple[int, int]) -> FloatArray:
+    """Bring a supersampled picture to its final size: halve what is far too large, then interpolate.
+
+    Parameters
+    ----------
+    image : array_like, shape (rows, columns, channels)
+    output_size : (int, int)
+        Width and height of the result.
+
+    Returns
+    -------
+    ndarray, shape (height, width, channels)
+        For factors 1, 2, 4, 8 this is exactly the mean over each s x s block. Other factors end with one
+        bilinear interpolation, edges extended.
+    """
+    picture: FloatArray = np.asarray(image, dtype=np.float64)
+    width, height = output_size
+    while picture.shape[1] > HALVE_ABOVE * width:
+        picture = _bilinear_resize(picture, (picture.shape[1] + 1) // 2, (picture.shape[0] + 1) // 2)
+    return _bilinear_resize(picture, width, height)
+
+
+def render(
+    warp_map: WarpMapLike,
+    environment: ArrayLike,
+    *,
+    rotation: ArrayLike = (0.0, 0.0, 0.0),
+    colour_amount: float = 1.0,
+    brightness_amount: float = 1.0,
+    temperature: float = DEFAULT_TEMPERATURE,
+    exposure: float = 0.0,
+    strength: float = 1.0,
+    foreground: ArrayLike | None = None,
+    output_size: tuple[int, int] | None = None,
+) -> ReferencePicture:
+    """Picture of a sky seen through a warp map, with an optional foreground in front of it.
+
+    Parameters
+    ----------
+    warp_map : WarpMapLike
+        Four channels of one shape, row 0 at the top; see `WarpMapLike`.
+    environment : array_like, shape (rows, columns, 3 or 4)
+        Equirectangular picture of the sky in scene-linear values, row 0 at the top. Alpha is ignored.
+    rotation : array_like, shape (3,)
+        XYZ Euler angles (radians) of the environment, as in a Mapping node (type Point) of a World's nodes.
+    colour_amount, brightness_amount : float
+        0 (off) to 1 (physical); see `colour.redshift_gain`.
+    temperature : float
+        Assumed black-body temperature of the sky in kelvin, > 0.
+    exposure : float
+        Stops by which the sky is brightened.
+    strength : float
+        Factor on the sky, the World's own strength.
+    foreground : array_like, shape (height, width, 4), optional
+        Premultiplied RGBA of the final size, row 0 at the top. Pixels of alpha 0 may carry light (flames).
+    output_size : (int, int), optional
+        Width and height of the picture. Default: the foreground's, or else the map's.
+
+    Returns
+    -------
+    ReferencePicture
+
+    Raises
+    ------
+    BlackHoleError
+        If shapes do not fit together, or for settings of the redshift that cannot be.
+
+    Notes
+    -----
+    sky = environment(R d) 2^exposure strength gain(1 + z) visibility for each pixel of the map, then the box
+    filter, then image = foreground + (1 - alpha) sky. Invalid pixels of the map are magenta in image and sky.
+    """
+    theta, phi, one_plus_z, visibility = _channels(warp_map)
+    sky_picture: FloatArray = np.asarray(environment, dtype=np.float64)
+    if sky_picture.ndim != 3 or sky_picture.shape[2] not in (3, 4):
+        raise BlackHoleError(f"The environment has shape {sky_picture.shape}, expected (rows, columns, 3 or 4).")
+    front = None if foreground is None else np.asarray(foreground, dtype=np.float64)
+    if front is not None and (front.ndim != 3 or front.shape[2] != 4):
+        raise BlackHoleError(f"The foreground has shape {front.shape}, expected (height, width, 4).")
+    if output_size is None:
+        rows, columns = theta.shape if front is None else front.shape[:2]
+        output_size = (columns, rows)
+    if front is not None and front.shape[:2] != output_size[::-1]:
+        rows, columns = front.shape[:2]
+        raise BlackHoleError(
+            f"The foreground is {columns}x{rows} pixels, the picture {output_size[0]}x{output_size[1]}."
+        )
+
+    invalid = invalid_pixels(warp_map)
+    shift = np.where(invalid, 1.0, one_plus_z)
+    seen = np.where(invalid, 1.0, visibility)
+    directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
+    colours = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
+    colours *= redshift_gain(shift, colour_amount, brightness_amount, temperature)
+    colours *= (2.0**exposure * strength * seen)[..., np.newaxis]
+    colours[invalid] = MAGENTA
+
+    data = np.stack([seen, shift, invalid.astype(np.float64)], axis=-1)
+    sky = resize(colours, output_size)
+    seen, shift, broken = np.moveaxis(resize(data, output_size), -1, 0)
+    image = sky if front is None else front[..., :3] + (1.0 - front[..., 3:]) * sky
+    # A broken map must not hide behind an opaque foreground.
+    image = image + broken[..., np.newaxis] * (np.asarray(MAGENTA) - image)
+    return ReferencePicture(image=_opaque(image), sky=_opaque(sky), shadow=1.0 - seen, redshift=shift)
+
+
+def _channels(warp_map: WarpMapLike) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    theta: FloatArray = np.asarray(warp_map.theta, dtype=np.float64)
+    phi: FloatArray = np.asarray(warp_map.phi, dtype=np.float64)
+    one_plus_z: FloatArray = np.asarray(warp_map.one_plus_z, dtype=np.float64)
+    visibility: FloatArray = np.asarray(warp_map.visibility, dtype=np.float64)
+    shapes = {theta.shape, phi.shape, one_plus_z.shape, visibility.shape}
+    if len(shapes) != 1 or theta.ndim != 2:
+        raise BlackHoleError("The warp map's four channels must share one shape (height, width).")
+    return theta, phi, one_plus_z, visibility
+
+
+def _within(values: FloatArray, low: float, high: float) -> BoolArray:
+    inside: BoolArray = (values > low - ANGLE_SLACK) & (values < high + ANGLE_SLACK)
+    return inside
+
+
+def _bilinear_resize(picture: FloatArray, width: int, height: int) -> FloatArray:
+    """Bilinear samples at the new pixels' centres, edges extended; half the size averages 2 x 2 pixels."""
+    rows, row_share = _interpolation(picture.shape[0], height)
+    columns, column_share = _interpolation(picture.shape[1], width)
+    below = np.minimum(rows + 1, picture.shape[0] - 1)
+    right = np.minimum(columns + 1, picture.shape[1] - 1)
+    by_rows = picture[rows] * (1.0 - row_share)[:, None, None] + picture[below] * row_share[:, None, None]
+    first, second = by_rows[:, columns], by_rows[:, right]
+    resized: FloatArray = first * (1.0 - column_share)[None, :, None] + second * column_share[None, :, None]
+    return resized
+
+
+def _interpolation(old_count: int, new_count: int) -> tuple[NDArray[np.int64], FloatArray]:
+    """For each new pixel, the old pixel before its centre and the next one's weight."""
+    centres = (np.arange(new_count) + 0.5) * old_count / new_count - 0.5
+    centres = np.clip(centres, 0.0, old_count - 1.0)
+    before = np.floor(centres).astype(np.int64)
+    return before, centres - before
+
+
+def _opaque(colours: FloatArray) -> FloatArray:
+    return np.concatenate([colours, np.ones_like(colours[..., :1])], axis=-1)
