@@ -29,7 +29,7 @@ SCENE_SCRIPT = Path(__file__).with_name("end_to_end_scene.py")
 SIZE = (160, 90)
 ROTATION = (0.1, 0.2, 0.7)
 STRENGTH = 0.8
-BALL_COLOUR = (0.1, 0.6, 0.2)
+BALL_COLOR = (0.1, 0.6, 0.2)
 # Where the ball is in the picture, generously: rows and columns. The rest is sky and hole.
 BALL_REGION = (slice(50, 90), slice(100, 160))
 TOLERANCE = 1e-4
@@ -77,7 +77,7 @@ def make_sky() -> np.ndarray:
 
 
 def compare(folder: Path, sky: np.ndarray) -> None:
-    """Each picture against the reference; the ball against its own colour."""
+    """Each picture against the reference; the ball against its own color."""
     maps = sorted(folder.rglob("umbra_maps/*.exr"))
     pictures = sorted(folder.glob("picture_*.exr"))
     if len(maps) != 2 or len(pictures) != 2:
@@ -88,7 +88,7 @@ def compare(folder: Path, sky: np.ndarray) -> None:
         picture = read_exr(picture_path)[0][..., :3]
         difference = np.abs(picture - expected)
         difference[BALL_REGION] = 0.0
-        ball = np.all(np.abs(picture[BALL_REGION] - BALL_COLOUR) < 1e-3, axis=-1).sum()
+        ball = np.all(np.abs(picture[BALL_REGION] - BALL_COLOR) < 1e-3, axis=-1).sum()
         shadow = np.count_nonzero(warp_map.visibility == 0.0)
         print(f"frame {number}: largest difference {difference.max():.1e}, shadow {shadow} px, ball {ball} px")
         if picture.shape[:2] != SIZE[::-1] or difference.max() > TOLERANCE:
@@ -154,7 +154,7 @@ def main() -> None:
             "size": SIZE,
             "rotation": ROTATION,
             "strength": STRENGTH,
-            "ball_colour": BALL_COLOUR,
+            "ball_color": BALL_COLOR,
         }
         scene_script = shutil.copy(SCENE_SCRIPT, folder)
         (folder / "settings.json").write_text(json.dumps(settings), encoding="utf-8")

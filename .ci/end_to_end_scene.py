@@ -28,8 +28,8 @@ def set_up_world(world: bpy.types.World, settings: dict) -> None:
     background.inputs["Strength"].default_value = settings["strength"]
 
 
-def add_ball(colour: list[float]) -> None:
-    """A ball that shines with one colour, in the lower right corner of the picture."""
+def add_ball(color: list[float]) -> None:
+    """A ball that shines with one color, in the lower right corner of the picture."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.35, location=(1.5, -3.0, -0.75))
     material = bpy.data.materials.new("Ball")
     if material.node_tree is None:  # before Blender 5
@@ -37,7 +37,7 @@ def add_ball(colour: list[float]) -> None:
     tree = material.node_tree
     tree.nodes.clear()
     emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value = (*colour, 1.0)
+    emission.inputs["Color"].default_value = (*color, 1.0)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     bpy.context.object.data.materials.append(material)
@@ -60,7 +60,7 @@ def main(settings: dict) -> None:
         bpy.data.objects.remove(thing)
     scene = bpy.context.scene
     set_up_world(scene.world, settings)
-    add_ball(settings["ball_colour"])
+    add_ball(settings["ball_color"])
     add_camera(scene)
     scene.render.engine = "CYCLES"
     scene.cycles.samples = 4

@@ -29,7 +29,7 @@ def plot_errors(curves: dict[str, list[tuple[float, float, float]]], machine: st
         axes.loglog(tolerance, median, marker=".", linestyle="--", color=line.get_color(), label=f"{label}, median")
     every = [point[0] for points in curves.values() for point in points]
     ends = [min(every), max(every)]
-    axes.loglog(ends, ends, color="grey", linewidth=0.8, label="error = tolerance")
+    axes.loglog(ends, ends, color="gray", linewidth=0.8, label="error = tolerance")
     axes.set(xlabel="tolerance (radians)", ylabel="error of direction (radians)", title="Error against tolerance")
     _finish(figure, axes, machine, path)
 
@@ -37,6 +37,6 @@ def plot_errors(curves: dict[str, list[tuple[float, float, float]]], machine: st
 def _finish(figure: plt.Figure, axes: plt.Axes, machine: str, path: Path) -> None:
     axes.grid(which="both", alpha=0.25)
     axes.legend()
-    figure.text(0.995, 0.005, machine, ha="right", va="bottom", fontsize=6, color="grey")
+    figure.text(0.995, 0.005, machine, ha="right", va="bottom", fontsize=6, color="gray")
     figure.savefig(path, dpi=120)
     plt.close(figure)

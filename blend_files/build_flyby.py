@@ -31,15 +31,15 @@ def rock_material() -> bpy.types.Material:
     made = tools.material("Rock", (0.2, 0.18, 0.16), roughness=0.95)
     place = tools.add_node(made, "ShaderNodeTexCoord", {}).outputs["Object"]
     patches = tools.add_node(made, "ShaderNodeTexNoise", {"Vector": place, "Scale": 2.6, "Detail": 10.0})
-    colour = tools.colour_ramp(
+    color = tools.color_ramp(
         made,
         patches.outputs["Fac"],
         [(0.3, (0.07, 0.06, 0.055)), (0.55, (0.24, 0.20, 0.17)), (0.75, (0.44, 0.38, 0.32))],
     )
     own = tools.add_node(made, "ShaderNodeObjectInfo", {}).outputs["Random"]
-    shade = tools.colour_ramp(made, own, [(0.0, (0.6, 0.62, 0.66)), (0.6, (1.0, 0.95, 0.9)), (1.0, (1.0, 0.75, 0.55))])
+    shade = tools.color_ramp(made, own, [(0.0, (0.6, 0.62, 0.66)), (0.6, (1.0, 0.95, 0.9)), (1.0, (1.0, 0.75, 0.55))])
     mix = tools.add_node(made, "ShaderNodeMix", {0: 1.0}, data_type="RGBA", blend_type="MULTIPLY")
-    for socket, source in ((mix.inputs[6], colour), (mix.inputs[7], shade)):
+    for socket, source in ((mix.inputs[6], color), (mix.inputs[7], shade)):
         made.node_tree.links.new(source, socket)
     tools.feed(made, "Base Color", mix.outputs[2])
     fine = tools.add_node(made, "ShaderNodeTexNoise", {"Vector": place, "Scale": 9.0, "Detail": 8.0})

@@ -10,7 +10,7 @@ import math
 
 import scene_tools as tools
 import skies
-from scene_tools import Colour, MeshParts, bpy
+from scene_tools import Color, MeshParts, bpy
 
 FRAMES = 72
 SKY_HEIGHT, STAR_WIDTH, SKY_QUALITY = 1280, 0.7, 72
@@ -38,9 +38,9 @@ def calculate(made: bpy.types.Material, operation: str, *values: float | bpy.typ
 
 
 def mixed(
-    made: bpy.types.Material, share: bpy.types.NodeSocket, one: bpy.types.NodeSocket | Colour, other: Colour
+    made: bpy.types.Material, share: bpy.types.NodeSocket, one: bpy.types.NodeSocket | Color, other: Color
 ) -> bpy.types.NodeSocket:
-    """A colour between two."""
+    """A color between two."""
     node = tools.add_node(made, "ShaderNodeMix", {0: share}, data_type="RGBA")
     made.node_tree.links.new(one, node.inputs[6])
     node.inputs[7].default_value = (*other, 1.0)
@@ -67,7 +67,7 @@ def gas_giant(radius: float) -> bpy.types.Material:
     brown, slate = (0.30, 0.12, 0.05), (0.34, 0.36, 0.42)
     stops = [(0.0, slate), (0.12, brown), (0.20, cream), (0.28, rust), (0.35, white), (0.42, cream), (0.47, brown)]
     stops += [(0.52, white), (0.58, white), (0.63, rust), (0.68, brown), (0.74, cream), (0.83, rust), (0.90, cream)]
-    tools.feed(made, "Base Color", tools.colour_ramp(made, height, [*stops, (1.0, slate)]))
+    tools.feed(made, "Base Color", tools.color_ramp(made, height, [*stops, (1.0, slate)]))
     return made
 
 
@@ -80,14 +80,14 @@ def planetary_rings(inner: float, outer: float) -> bpy.types.Material:
     grooves = tools.add_node(
         made, "ShaderNodeTexNoise", {"W": share, "Scale": 16.0, "Detail": 5.0}, noise_dimensions="1D"
     ).outputs["Fac"]
-    tint = tools.colour_ramp(
+    tint = tools.color_ramp(
         made, grooves, [(0.3, (0.42, 0.30, 0.20)), (0.5, (0.80, 0.66, 0.48)), (0.7, (1, 0.94, 0.84))]
     )
     tools.feed(made, "Base Color", tint)
-    thick = tools.colour_ramp(made, grooves, [(0.32, (0.1, 0.1, 0.1)), (0.5, (0.75, 0.75, 0.75)), (0.7, (1, 1, 1))])
+    thick = tools.color_ramp(made, grooves, [(0.32, (0.1, 0.1, 0.1)), (0.5, (0.75, 0.75, 0.75)), (0.7, (1, 1, 1))])
     one, none = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
     stops = [(0.0, none), (0.06, one), (0.58, one), (0.60, (0.04, 0.04, 0.04)), (0.66, (0.04, 0.04, 0.04))]
-    gaps = tools.colour_ramp(made, share, [*stops, (0.68, one), (0.95, one), (1.0, none)])
+    gaps = tools.color_ramp(made, share, [*stops, (0.68, one), (0.95, one), (1.0, none)])
     tools.feed(made, "Alpha", calculate(made, "MULTIPLY", thick, gaps))
     return made
 
@@ -99,15 +99,15 @@ def ocean_world(radius: float) -> bpy.types.Material:
     land = noise(made, place, 1.3 / radius, 10.0)
     sea, shore = (0.006, 0.035, 0.14), (0.02, 0.16, 0.30)
     stops = [(0.0, sea), (0.49, sea), (0.52, shore), (0.53, (0.10, 0.20, 0.05)), (0.60, (0.26, 0.20, 0.09))]
-    ground = tools.colour_ramp(made, land, [*stops, (0.72, (0.42, 0.36, 0.30))])
+    ground = tools.color_ramp(made, land, [*stops, (0.72, (0.42, 0.36, 0.30))])
     axes = tools.add_node(made, "ShaderNodeSeparateXYZ", {"Vector": place})
     north = calculate(made, "DIVIDE", calculate(made, "ABSOLUTE", axes.outputs["Z"]), radius)
     ice = calculate(made, "MULTIPLY_ADD", calculate(made, "SUBTRACT", land, 0.5), 0.6, north)
-    ice = tools.colour_ramp(made, ice, [(0.80, (0, 0, 0)), (0.86, (1, 1, 1))])
+    ice = tools.color_ramp(made, ice, [(0.80, (0, 0, 0)), (0.86, (1, 1, 1))])
     ground = mixed(made, ice, ground, (0.85, 0.90, 0.95))
     flat = tools.add_node(made, "ShaderNodeMapping", {"Vector": place, "Scale": (1.0, 1.0, 1.9)})
     clouds = noise(made, flat.outputs["Vector"], 2.4 / radius, 12.0, 1.1)
-    clouds = tools.colour_ramp(made, clouds, [(0.50, (0, 0, 0)), (0.68, (0.95, 0.95, 0.95))])
+    clouds = tools.color_ramp(made, clouds, [(0.50, (0, 0, 0)), (0.68, (0.95, 0.95, 0.95))])
     tools.feed(made, "Base Color", mixed(made, clouds, ground, (0.92, 0.94, 0.97)))
     return made
 
@@ -122,17 +122,17 @@ def lava_world(radius: float) -> bpy.types.Material:
     ).outputs["Distance"]
     crust = calculate(made, "MULTIPLY_ADD", calculate(made, "SUBTRACT", warped, 0.42), 0.5, crust)
     stops = [(0.0, (1.0, 0.42, 0.08)), (0.05, (1.0, 0.16, 0.01)), (0.12, (0.15, 0.01, 0.0)), (0.2, (0.0, 0.0, 0.0))]
-    tools.feed(made, "Emission Color", tools.colour_ramp(made, crust, stops))
+    tools.feed(made, "Emission Color", tools.color_ramp(made, crust, stops))
     raised(made, warped, 0.8, 0.3 * radius)
     return made
 
 
-def barren_moon(name: str, radius: float, dark: Colour, light: Colour) -> bpy.types.Material:
+def barren_moon(name: str, radius: float, dark: Color, light: Color) -> bpy.types.Material:
     """Rock or ice with craters."""
     made = tools.material(name, light, roughness=0.95)
     place = object_coordinates(made)
     plains = noise(made, place, 2.0 / radius, 10.0)
-    tools.feed(made, "Base Color", tools.colour_ramp(made, plains, [(0.38, dark), (0.62, light)]))
+    tools.feed(made, "Base Color", tools.color_ramp(made, plains, [(0.38, dark), (0.62, light)]))
     craters = tools.add_node(
         made, "ShaderNodeTexVoronoi", {"Vector": place, "Scale": 4.5 / radius}, feature="F1"
     ).outputs["Distance"]
@@ -173,8 +173,8 @@ def build() -> None:
     ringed_planet(7.0, (7.0, 52.0, -3.0))
     tools.ball("Ocean World", 4.4, (-18.0, 30.0, -8.5), ocean_world(4.4))
     tools.ball("Lava World", 2.6, (22.5, 14.0, -8.0), lava_world(2.6))
-    grey, pale = ((0.10, 0.095, 0.09), (0.42, 0.40, 0.37)), ((0.42, 0.50, 0.58), (0.86, 0.90, 0.94))
-    tools.ball("Grey Moon", 2.0, (-22.0, 8.0, 9.5), barren_moon("Grey Rock", 2.0, *grey))
+    gray, pale = ((0.10, 0.095, 0.09), (0.42, 0.40, 0.37)), ((0.42, 0.50, 0.58), (0.86, 0.90, 0.94))
+    tools.ball("Gray Moon", 2.0, (-22.0, 8.0, 9.5), barren_moon("Gray Rock", 2.0, *gray))
     tools.ball("Ice Moon", 1.4, (15.5, 10.0, 12.0), barren_moon("Ice", 1.4, *pale))
 
     tools.sun("Sun", (-0.95, -0.55, 0.5), 5.5, (1.0, 0.93, 0.84))

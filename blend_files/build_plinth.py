@@ -17,7 +17,7 @@ HDRI = "sunset.exr"
 
 DISTANCE = 6.0  # of the camera from the hole
 DISTANCE_IN_M = 30.0
-TOP = -1.62  # height of the plinth's upper face; the hole's centre is at 0
+TOP = -1.62  # height of the plinth's upper face; the hole's center is at 0
 
 
 def sunset_world(scene: bpy.types.Scene, turn: float, strength: float) -> None:
@@ -61,18 +61,18 @@ def marble() -> bpy.types.Material:
         {"Vector": spread.outputs["Vector"], "Scale": 1.1},
         feature="DISTANCE_TO_EDGE",
     )
-    colour = tools.colour_ramp(
+    color = tools.color_ramp(
         stone,
         veins.outputs["Distance"],
         [(0.0, (0.75, 0.66, 0.52)), (0.012, (0.30, 0.27, 0.24)), (0.05, (0.035, 0.035, 0.04)), (0.3, (0.012,) * 3)],
     )
-    tools.feed(stone, "Base Color", colour)
+    tools.feed(stone, "Base Color", color)
     return stone
 
 
-def brushed(name: str, colour: tools.Colour, roughness: float) -> bpy.types.Material:
+def brushed(name: str, color: tools.Color, roughness: float) -> bpy.types.Material:
     """Metal with fine uneven polish."""
-    metal = tools.material(name, colour, metallic=1.0, roughness=roughness)
+    metal = tools.material(name, color, metallic=1.0, roughness=roughness)
     coordinates = tools.add_node(metal, "ShaderNodeTexCoord", {})
     noise = tools.add_node(
         metal, "ShaderNodeTexNoise", {"Vector": coordinates.outputs["Object"], "Scale": 6.0, "Detail": 5.0}

@@ -40,13 +40,13 @@ def painted_hull() -> bpy.types.Material:
     wear = tools.add_node(
         hull, "ShaderNodeTexNoise", {"Vector": coordinates.outputs["Object"], "Scale": 9.0, "Detail": 6.0}
     )
-    colour = tools.colour_ramp(
+    color = tools.color_ramp(
         hull, shade.outputs["Red"], [(0.0, (0.40, 0.41, 0.43)), (0.5, (0.60, 0.61, 0.62)), (1.0, (0.72, 0.71, 0.69))]
     )
-    dirt = tools.colour_ramp(hull, wear.outputs["Fac"], [(0.35, (0.62, 0.60, 0.57)), (0.6, (1.0, 1.0, 1.0))])
+    dirt = tools.color_ramp(hull, wear.outputs["Fac"], [(0.35, (0.62, 0.60, 0.57)), (0.6, (1.0, 1.0, 1.0))])
     mix = tools.add_node(hull, "ShaderNodeMix", {}, data_type="RGBA", blend_type="MULTIPLY")
     mix.inputs[0].default_value = 1.0
-    for socket, source in ((mix.inputs[6], colour), (mix.inputs[7], dirt)):
+    for socket, source in ((mix.inputs[6], color), (mix.inputs[7], dirt)):
         hull.node_tree.links.new(source, socket)
     tools.feed(hull, "Base Color", mix.outputs[2])
     bump = tools.add_node(
@@ -189,8 +189,8 @@ def build_core(parent: bpy.types.Object, shades: dict[str, bpy.types.Material]) 
             wings.box(((x0 + x1) / 2, 0, 0), (0.92, 0.62, 0.012), frame)
             for column in range(9):
                 for row in range(6):
-                    centre = (x0 + side * (0.06 + 0.1 * column), -0.25 + 0.1 * row, 0.0)
-                    wings.box(centre, (0.09, 0.09, 0.02), cells)
+                    center = (x0 + side * (0.06 + 0.1 * column), -0.25 + 0.1 * row, 0.0)
+                    wings.box(center, (0.09, 0.09, 0.02), cells)
         wings.tube(Vector((0, 0, 0)), Vector((side * 2.15, 0, 0)), 0.02, 12, frame)
     wing = wings.build("Solar Wings", [shades["cells"], shades["dark"]], location=(0, 0, 2.1), parent=parent)
     wing.rotation_euler = (math.radians(-38.0), 0.0, math.radians(58.0))
@@ -242,7 +242,7 @@ def build() -> None:
     look["Environment Rotation"].default_value = skies.sky_rotation(14.0, 14.0, 28.0)
     look["Exposure"].default_value = 2.2
     look["Sky Temperature"].default_value = 4500.0
-    look["Redshift Colour"].default_value = 1.0
+    look["Redshift Color"].default_value = 1.0
     look["Redshift Brightness"].default_value = 1.0
 
     tools.moving_camera(

@@ -54,7 +54,7 @@ def render(path: Path, maps: str) -> None:
     scene.umbra.map_folder = maps
     bpy.ops.umbra.add_black_hole(spin=0.9, mass_scale=0.22)
     bpy.ops.umbra.set_output(output="CYCLES_LENS")
-    scene.umbra.redshift_colour = scene.umbra.redshift_brightness = 0.0
+    scene.umbra.redshift_color = scene.umbra.redshift_brightness = 0.0
     bpy.ops.render.render(write_still=True)
 
 

@@ -29,7 +29,7 @@ FIRST_VERSION_WITH_OTHER_FILES = (5, 0)
 __all__ = ["Euler", "Matrix", "MeshParts", "Vector", "bpy"]  # for scripts, which must not import these before bpy
 
 Point = tuple[float, float, float]
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -193,10 +193,10 @@ class MeshParts:
         self.faces.extend(tuple(start + corner for corner in face) for face in faces)
         self.materials.extend([material] * len(faces))
 
-    def box(self, centre: Point, size: Point, material: int = 0, axes: Matrix | None = None) -> None:
-        """A box; `axes` turns it about its centre's frame (4 x 4, applied last)."""
+    def box(self, center: Point, size: Point, material: int = 0, axes: Matrix | None = None) -> None:
+        """A box; `axes` turns it about its center's frame (4 x 4, applied last)."""
         corners = [
-            Vector((centre[0] + x * size[0] / 2, centre[1] + y * size[1] / 2, centre[2] + z * size[2] / 2))
+            Vector((center[0] + x * size[0] / 2, center[1] + y * size[1] / 2, center[2] + z * size[2] / 2))
             for x in (-1, 1)
             for y in (-1, 1)
             for z in (-1, 1)
@@ -301,40 +301,40 @@ def ball(
     return add_object(name, mesh, location, parent)
 
 
-def arc(centre: tuple[float, float], radius: float, start: float, end: float, steps: int) -> list[tuple[float, float]]:
+def arc(center: tuple[float, float], radius: float, start: float, end: float, steps: int) -> list[tuple[float, float]]:
     """Points of a circular arc in a lathe's profile; angles in degrees."""
     angles = np.radians(np.linspace(start, end, steps))
-    return [(centre[0] + radius * math.cos(a), centre[1] + radius * math.sin(a)) for a in angles]
+    return [(center[0] + radius * math.cos(a), center[1] + radius * math.sin(a)) for a in angles]
 
 
 # --- light and materials --------------------------------------------------------------------------
 
 
-def sun(name: str, direction_from: Point, strength: float, colour: Colour, size: float = 0.01) -> bpy.types.Object:
+def sun(name: str, direction_from: Point, strength: float, color: Color, size: float = 0.01) -> bpy.types.Object:
     """A sun that shines from a direction."""
     data = bpy.data.lights.new(name, "SUN")
-    data.energy, data.color, data.angle = strength, colour, size
+    data.energy, data.color, data.angle = strength, color, size
     light = add_object(name, data)
     light.rotation_euler = Vector(direction_from).to_track_quat("Z", "Y").to_euler()
     return light
 
 
-def area_light(name: str, location: Point, aim: Point, size: float, power: float, colour: Colour) -> bpy.types.Object:
+def area_light(name: str, location: Point, aim: Point, size: float, power: float, color: Color) -> bpy.types.Object:
     """A square soft light that is itself invisible."""
     data = bpy.data.lights.new(name, "AREA")
-    data.energy, data.color, data.size = power, colour, size
+    data.energy, data.color, data.size = power, color, size
     light = add_object(name, data, location)
     light.rotation_euler = (Vector(location) - Vector(aim)).to_track_quat("Z", "Y").to_euler()
     light.visible_camera = False
     return light
 
 
-def material(name: str, colour: Colour, **settings: float | Colour) -> bpy.types.Material:
+def material(name: str, color: Color, **settings: float | Color) -> bpy.types.Material:
     """A Principled material; settings by socket name with underscores, e.g. `emission_strength=4`."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     shader = made.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Base Color"].default_value = (*colour, 1.0)
+    shader.inputs["Base Color"].default_value = (*color, 1.0)
     sockets = {each.name.lower().replace(" ", "_"): each for each in shader.inputs}
     for key, value in settings.items():
         sockets[key].default_value = (*value, 1.0) if isinstance(value, tuple) else value
@@ -359,24 +359,24 @@ def feed(made: bpy.types.Material, socket_name: str, output: bpy.types.NodeSocke
     made.node_tree.links.new(output, made.node_tree.nodes["Principled BSDF"].inputs[socket_name])
 
 
-def colour_ramp(
-    made: bpy.types.Material, factor: bpy.types.NodeSocket, stops: Sequence[tuple[float, Colour]]
+def color_ramp(
+    made: bpy.types.Material, factor: bpy.types.NodeSocket, stops: Sequence[tuple[float, Color]]
 ) -> bpy.types.NodeSocket:
-    """A colour ramp's output."""
+    """A color ramp's output."""
     node = add_node(made, "ShaderNodeValToRGB", {"Fac": factor})
     ramp = node.color_ramp
     while len(ramp.elements) < len(stops):
         ramp.elements.new(1.0)
-    for element, (position, colour) in zip(ramp.elements, stops, strict=True):
-        element.position, element.color = position, (*colour, 1.0)
+    for element, (position, color) in zip(ramp.elements, stops, strict=True):
+        element.position, element.color = position, (*color, 1.0)
     return node.outputs["Color"]
 
 
-def world_background(scene: bpy.types.Scene, colour: Colour, strength: float) -> bpy.types.Node:
-    """A World of one colour; returns its Background node."""
+def world_background(scene: bpy.types.Scene, color: Color, strength: float) -> bpy.types.Node:
+    """A World of one color; returns its Background node."""
     scene.world = bpy.data.worlds.new("World")
     scene.world.use_nodes = True
     background = scene.world.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (*colour, 1.0)
+    background.inputs["Color"].default_value = (*color, 1.0)
     background.inputs["Strength"].default_value = strength
     return background

@@ -64,9 +64,9 @@ def sky_rotation(longitude: float, latitude: float, roll: float) -> Euler:
 
 
 def star_world(
-    scene: bpy.types.Scene, image: bpy.types.Image, rotation: Euler, strength: float, fill: tools.Colour
+    scene: bpy.types.Scene, image: bpy.types.Image, rotation: Euler, strength: float, fill: tools.Color
 ) -> None:
-    """A World that shows the camera the stars, and lights the objects with one dim colour, which makes no noise."""
+    """A World that shows the camera the stars, and lights the objects with one dim color, which makes no noise."""
     background = tools.world_background(scene, fill, 1.0)
     tree = scene.world.node_tree
     coordinates = tree.nodes.new("ShaderNodeTexCoord")

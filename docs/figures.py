@@ -104,7 +104,7 @@ def radial_motion() -> Figure:
         for (c2, c3, c4), each, fate in zip(coefficients, b, ("falls in", "circles", "turns back"), strict=True):
             axes.plot(u, 1.0 + u * u * (c2 + u * (c3 + u * c4)), label=f"b = {each:.3g} M: {fate}")
         axes.axhline(0.0, color="black", linewidth=0.8)
-        axes.axvline(1.0 / horizon_radius(spin), color="grey", linestyle=":", label="horizon")
+        axes.axvline(1.0 / horizon_radius(spin), color="gray", linestyle=":", label="horizon")
         axes.set(xlabel="u = 1/r (1/M)", title=f"spin {spin:g}", ylim=(-0.6, 1.6))
         axes.legend(fontsize=8)
     panels[0].set_ylabel("U(u) = (du/dλ)²")
@@ -191,7 +191,7 @@ def deflection() -> Figure:
             axes.plot(np.abs(b), np.degrees(traced_deflection(spin, b)), style, label=label)
     b = trapped_impact_parameters(0.0)[1] + away[::6]
     axes.plot(b, np.degrees(schwarzschild_deflection(b)), "k.", label="spin 0, Darwin's closed form")
-    axes.plot(b, np.degrees(4.0 / b), color="grey", linestyle=":", label="4 M / b, far from the hole")
+    axes.plot(b, np.degrees(4.0 / b), color="gray", linestyle=":", label="4 M / b, far from the hole")
     axes.set(xlabel="impact parameter |b| (M)", ylabel="bent by (degrees)", xlim=(2.0, 12.0), ylim=(0.0, 400.0))
     axes.legend(fontsize=8)
     return figure

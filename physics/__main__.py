@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\ncancelled: nothing was written", file=sys.stderr)
+        print("\ncanceled: nothing was written", file=sys.stderr)
         return 130
     return 0
 
@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
         "--rotation", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"), help="of the sky, degrees"
     )
     rendering.add_argument("--exposure", type=float, default=0.0, help="stops by which the sky is brightened")
-    rendering.add_argument("--redshift-colour", type=float, default=1.0, help="0 off, 1 physical")
+    rendering.add_argument("--redshift-color", type=float, default=1.0, help="0 off, 1 physical")
     rendering.add_argument("--redshift-brightness", type=float, default=1.0, help="0 off, 1 physical")
     rendering.add_argument("--temperature", type=float, default=6500.0, help="of the sky's light, kelvin")
     disk_command.add_render_options(rendering)
@@ -188,7 +188,7 @@ def _render(options: argparse.Namespace) -> None:
         warp_map,
         environment,
         rotation=[math.radians(angle) for angle in options.rotation],
-        colour_amount=options.redshift_colour,
+        color_amount=options.redshift_color,
         brightness_amount=options.redshift_brightness,
         temperature=options.temperature,
         exposure=options.exposure,

@@ -48,7 +48,7 @@ def parse_frames(text: str) -> list[int]:
 
 
 def frames_text(frames: list[int]) -> str:
-    """Return frames as a text that `parse_frames` reads, runs of neighbours as ranges: "1-4,9"."""
+    """Return frames as a text that `parse_frames` reads, runs of neighbors as ranges: "1-4,9"."""
     runs: list[list[int]] = []
     for frame in frames:
         if runs and frame == runs[-1][1] + 1:

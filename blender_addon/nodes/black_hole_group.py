@@ -8,9 +8,9 @@ Render
     a Render Layers node: premultiplied, of the render's size. May be left unlinked: then there is sky only.
 Environment
     An Image node with an equirectangular picture of any size, row by row as Blender shows it (zenith at the
-    top), in the colour space the file was made in (it is converted to scene-linear by Blender). Its alpha
-    is ignored. Unlinked the socket's own colour is the sky, the same in all directions: a World with a
-    plain background colour.
+    top), in the color space the file was made in (it is converted to scene-linear by Blender). Its alpha
+    is ignored. Unlinked the socket's own color is the sky, the same in all directions: a World with a
+    plain background color.
 Warp Map
     An Image node with the baked EXR, a single image or a sequence. The image must be Non-Color
     (`image.colorspace_settings.name`) and Channel Packed (`image.alpha_mode = "CHANNEL_PACKED"`). Its
@@ -51,7 +51,7 @@ RENDER = SocketSpec(
 ENVIRONMENT = SocketSpec(
     "Environment",
     "NodeSocketColor",
-    "Equirectangular picture of the sky, of any size, or one colour for all of the sky",
+    "Equirectangular picture of the sky, of any size, or one color for all of the sky",
     default=(0.0, 0.0, 0.0, 1.0),
 )
 WARP_MAP = SocketSpec(
@@ -85,10 +85,10 @@ EXPOSURE = SocketSpec(
     minimum=-32.0,
     maximum=32.0,
 )
-REDSHIFT_COLOUR = SocketSpec(
-    "Redshift Colour",
+REDSHIFT_COLOR = SocketSpec(
+    "Redshift Color",
     "NodeSocketFloat",
-    "How much the frequency shift changes the colour of the sky: 0 is off, 1 is physical",
+    "How much the frequency shift changes the color of the sky: 0 is off, 1 is physical",
     default=1.0,
     minimum=0.0,
     maximum=1.0,
@@ -107,7 +107,7 @@ REDSHIFT_BRIGHTNESS = SocketSpec(
 TEMPERATURE = SocketSpec(
     "Sky Temperature",
     "NodeSocketFloat",
-    "Colour temperature of the sky's light (kelvin) from which the shift of its colour is computed",
+    "Color temperature of the sky's light (kelvin) from which the shift of its color is computed",
     default=color.DEFAULT_TEMPERATURE,
     minimum=1000.0,
     maximum=40000.0,
@@ -139,7 +139,7 @@ INPUTS = (
     ROTATION,
     STRENGTH,
     EXPOSURE,
-    REDSHIFT_COLOUR,
+    REDSHIFT_COLOR,
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
     DISK,
@@ -155,7 +155,7 @@ def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket
         rotation=sockets[ROTATION.name],
         strength=sockets[STRENGTH.name],
         exposure=sockets[EXPOSURE.name],
-        redshift_colour=sockets[REDSHIFT_COLOUR.name],
+        redshift_color=sockets[REDSHIFT_COLOR.name],
         redshift_brightness=sockets[REDSHIFT_BRIGHTNESS.name],
         temperature=sockets[TEMPERATURE.name],
         disk=sockets[DISK.name],

@@ -34,7 +34,7 @@ class GroupInputs:
     rotation: Socket
     strength: Socket
     exposure: Socket
-    redshift_colour: Socket
+    redshift_color: Socket
     redshift_brightness: Socket
     temperature: Socket
     disk: Socket
@@ -92,7 +92,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
         environment = sample_bilinearly(builder, inputs.environment, u, v)
     with builder.frame("Redshift"):
         gain = redshift_gain(
-            builder, channels.one_plus_z, inputs.redshift_colour, inputs.redshift_brightness, inputs.temperature
+            builder, channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature
         )
     with builder.frame("Sky"):
         factor = builder.math("MULTIPLY", builder.math("POWER", 2.0, inputs.exposure), inputs.strength)
@@ -112,7 +112,7 @@ def _read_map(builder: TreeBuilder, warp_map: Value) -> _MapChannels:
     slack = reference_render.ANGLE_SLACK
     smallest = reference_render.SMALLEST_ONE_PLUS_Z
     largest = reference_render.LARGEST_ONE_PLUS_Z
-    theta, phi, one_plus_z, visibility = builder.separate_colour(warp_map)
+    theta, phi, one_plus_z, visibility = builder.separate_color(warp_map)
     # Every comparison is false for NaN, so NaN makes a pixel invalid.
     conditions = (
         builder.math("COMPARE", theta, math.pi / 2.0, math.pi / 2.0 + slack, label="theta in 0..pi"),
@@ -221,11 +221,11 @@ def sample_bilinearly(builder: TreeBuilder, environment: Value, u: Value, v: Val
 
 
 def sample_with_alpha(builder: TreeBuilder, picture: Value, u: Value, v: Value) -> tuple[Socket, Socket]:
-    """The same look-up of a picture's colour as a vector, and of its alpha."""
+    """The same look-up of a picture's color as a vector, and of its alpha."""
     if SETTINGS_ARE_SOCKETS:
-        colour = sample_bilinearly(builder, picture, u, v)
-        return colour, builder.separate_colour(colour)[3]
-    _, _, _, alpha = builder.separate_colour(picture)
+        rgba = sample_bilinearly(builder, picture, u, v)
+        return rgba, builder.separate_color(rgba)[3]
+    _, _, _, alpha = builder.separate_color(picture)
     alphas = sample_bilinearly(builder, builder.combine(alpha, alpha, alpha), u, v)
     return sample_bilinearly(builder, picture, u, v), builder.separate(alphas)[0]
 
@@ -233,7 +233,7 @@ def sample_with_alpha(builder: TreeBuilder, picture: Value, u: Value, v: Value) 
 def redshift_gain(
     builder: TreeBuilder, one_plus_z: Socket, amount: Value, brightness_amount: Value, temperature: Value
 ) -> Socket:
-    """Vector of the gains of red, green and blue; see `physics.colour` for the formula and where it is from.
+    """Vector of the gains of red, green and blue; see `physics.color` for the formula and where it is from.
 
     exp(4 (c - k) ln(1+z) + c (x - y + ln(1 - exp(-x)) - ln(1 - exp(-y)))), y = (1 + z) x: by logarithms, so
     that nothing overflows on the way.
@@ -322,7 +322,7 @@ def _coverage(builder: TreeBuilder, image: Socket, area: Socket, shifts: tuple[S
 def _centring(builder: TreeBuilder, size: Socket, area_size: Socket) -> Socket:
     """Shift (in the render's pixels) that undoes Blender's rounding when an image is scaled from even to odd.
 
-    Blender lays images centre on centre. If one has an odd and the other an even number of pixels, it
+    Blender lays images center on center. If one has an odd and the other an even number of pixels, it
     shifts the scaled one by half a pixel of its own to make the grids coincide, which only images that are
     not scaled need. It does so when it interpolates bilinearly; nearest pixels stay where they belong.
     """
@@ -367,9 +367,9 @@ def _mean_of_four(builder: TreeBuilder, grid: Socket, images: list[Socket]) -> S
 def _compose(builder: TreeBuilder, inputs: GroupInputs, sky: Socket, data: Socket) -> GroupOutputs:
     """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames."""
     visibility, one_plus_z, valid = builder.separate(data)
-    _, _, _, covered = builder.separate_colour(inputs.disk)
+    _, _, _, covered = builder.separate_color(inputs.disk)
     sky = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, covered), inputs.disk)
-    _, _, _, alpha = builder.separate_colour(inputs.render)
+    _, _, _, alpha = builder.separate_color(inputs.render)
     image = builder.vector_math("MULTIPLY_ADD", sky, builder.math("SUBTRACT", 1.0, alpha), inputs.render)
     image = builder.select_vector(valid, reference_render.MAGENTA, image, "Magenta if invalid")
     return GroupOutputs(

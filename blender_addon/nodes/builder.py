@@ -42,7 +42,7 @@ class TreeBuilder:
 
     @contextmanager
     def frame(self, label: str) -> Iterator[None]:
-        """Put the nodes made inside this context into a labelled frame."""
+        """Put the nodes made inside this context into a labeled frame."""
         self._close_columns()
         frame = self.tree.nodes.new("NodeFrame")
         frame.label = label
@@ -120,7 +120,7 @@ class TreeBuilder:
         return self._mix("FLOAT", (condition, otherwise, chosen), label)
 
     def select_vector(self, condition: Value, otherwise: Value, chosen: Value, label: str = "") -> Socket:
-        """Vector (or colour without alpha): `chosen` where the condition is 1, in proportion in between."""
+        """Vector (or color without alpha): `chosen` where the condition is 1, in proportion in between."""
         return self._mix("VECTOR", (condition, otherwise, chosen), label)
 
     def _mix(self, data_type: str, values: tuple[Value, Value, Value], label: str) -> Socket:
@@ -159,15 +159,15 @@ class TreeBuilder:
     # Images
     # ----------------------------------------------------------------------------------------------------
 
-    def separate_colour(self, colour: Value, label: str = "") -> tuple[Socket, Socket, Socket, Socket]:
+    def separate_color(self, color: Value, label: str = "") -> tuple[Socket, Socket, Socket, Socket]:
         """Red, green, blue and alpha as they are stored: nothing is divided by alpha."""
         node = self.node("CompositorNodeSeparateColor", label)
         node.mode = "RGB"
-        self.feed(node.inputs[0], colour)
+        self.feed(node.inputs[0], color)
         return node.outputs[0], node.outputs[1], node.outputs[2], node.outputs[3]
 
-    def combine_colour(self, red: Value, green: Value, blue: Value, alpha: Value = 1.0, label: str = "") -> Socket:
-        """Colour of four floats."""
+    def combine_color(self, red: Value, green: Value, blue: Value, alpha: Value = 1.0, label: str = "") -> Socket:
+        """Color of four floats."""
         node = self.node("CompositorNodeCombineColor", label)
         node.mode = "RGB"
         for target, value in zip(node.inputs, (red, green, blue, alpha), strict=True):
@@ -175,7 +175,7 @@ class TreeBuilder:
         return node.outputs[0]
 
     def image_size(self, image: Value, label: str = "") -> tuple[Socket, Socket]:
-        """Width and height of an image in pixels; 0 and 0 for a plain colour or a missing file."""
+        """Width and height of an image in pixels; 0 and 0 for a plain color or a missing file."""
         node = self.node("CompositorNodeImageInfo", label)
         self.feed(node.inputs[0], image)
         width, height, _ = self.separate(node.outputs["Dimensions"])
@@ -210,7 +210,7 @@ class TreeBuilder:
         return node.outputs[0]
 
     def scale_by(self, image: Value, factor: Value, interpolation: str = "Nearest", label: str = "") -> Socket:
-        """Scale an image about its centre by one factor for both axes."""
+        """Scale an image about its center by one factor for both axes."""
         node = self._scale(image, interpolation, label)
         if SETTINGS_ARE_SOCKETS:
             node.inputs["Type"].default_value = "Relative"

@@ -3,7 +3,7 @@
 
 They draw a disk from the passes that were baked along with a warp map: for the input Disk of the group "Umbra Black
 Hole", or over the picture of a camera that bends its rays. Pass 1 and so on must be Image nodes with the baked EXRs,
-Non-Color and Channel Packed like the warp map; Colours is a table, and Texture is a picture with azimuth across and
+Non-Color and Channel Packed like the warp map; Colors is a table, and Texture is a picture with azimuth across and
 ln(radius) down, see `disk_images`.
 
 A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
@@ -42,7 +42,7 @@ def _factor(name: str, description: str, default: float) -> SocketSpec:
     return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=0.0, maximum=1.0, subtype="FACTOR")
 
 
-BEHIND, COLOURS, TEXTURE = "Behind", "Colours", "Texture"
+BEHIND, COLORS, TEXTURE = "Behind", "Colors", "Texture"
 OUTPUT, IMAGE = "Disk", "Image"
 PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
 
@@ -50,9 +50,9 @@ _LOOK = disk_look.DiskLook()
 
 LOOK_SOCKETS = {
     "temperature": "Temperature",
-    "doppler_colour": "Doppler Colour",
+    "doppler_color": "Doppler Color",
     "doppler_brightness": "Doppler Brightness",
-    "colour_variation": "Colour Variation",
+    "color_variation": "Color Variation",
     "falloff": "Falloff",
     "exponent": "Falloff Power",
     "exposure": "Disk Exposure",
@@ -72,7 +72,7 @@ INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
 _BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
 _INPUTS = (
-    _picture(COLOURS, "Table of the colours of hot bodies (Non-Color)"),
+    _picture(COLORS, "Table of the colors of hot bodies (Non-Color)"),
     _picture(
         TEXTURE,
         "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
@@ -98,14 +98,14 @@ _INPUTS = (
         maximum=disk_look.HOTTEST,
         subtype="COLOR_TEMPERATURE",
     ),
-    _factor(LOOK_SOCKETS["doppler_colour"], "How much the disk's motion changes its colour", _LOOK.doppler_colour),
+    _factor(LOOK_SOCKETS["doppler_color"], "How much the disk's motion changes its color", _LOOK.doppler_color),
     _factor(
         LOOK_SOCKETS["doppler_brightness"],
         "How much the disk's motion changes its brightness",
         _LOOK.doppler_brightness,
     ),
-    _number(BEAMING, "Power of the frequency ratio in the brightness: 4, or 3 for one colour", 4.0, 3.0, 4.0),
-    _factor(LOOK_SOCKETS["colour_variation"], "How much cooler the dim parts are", _LOOK.colour_variation),
+    _number(BEAMING, "Power of the frequency ratio in the brightness: 4, or 3 for one color", 4.0, 3.0, 4.0),
+    _factor(LOOK_SOCKETS["color_variation"], "How much cooler the dim parts are", _LOOK.color_variation),
     _factor(LOOK_SOCKETS["falloff"], "How far the brightness follows the profile", _LOOK.falloff),
     _number(LOOK_SOCKETS["exposure"], "Brightens the disk by this many stops", _LOOK.exposure, -32.0, 32.0),
     _factor(LOOK_SOCKETS["opacity"], "How much the densest parts hide what is behind", _LOOK.opacity),
@@ -209,7 +209,7 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
 def _disk_inputs(sockets: dict[str, Socket]) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
         disk_pass=sockets[PASS],
-        colours=sockets[COLOURS],
+        colors=sockets[COLORS],
         texture=sockets[TEXTURE],
         phase=sockets[PHASE],
         first_turn=sockets[FIRST_TURN],

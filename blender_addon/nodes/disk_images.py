@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disk's small pictures, made by numpy and packed into the file: a table of colours, and the streaks.
+"""The disk's small pictures, made by numpy and packed into the file: a table of colors, and the streaks.
 
 The table is a column of pixels, its first value at the top.
 """
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..core.physics_api import disk_look, disk_texture, exr
 
-COLOURS_NAME, TEXTURE_NAME = "Umbra Disk Colours", "Umbra Disk Streaks"
+COLORS_NAME, TEXTURE_NAME = "Umbra Disk Colors", "Umbra Disk Streaks"
 
-COLOUR_ROWS = disk_look.COLOURS  # those of numpy itself, between which it interpolates too
+COLOR_ROWS = disk_look.COLORS  # those of numpy itself, between which it interpolates too
 
 # Pictures are scaled down to this before their means are taken.
 MEANS_SIZE = 512
@@ -31,14 +31,14 @@ TEXTURE_STEPS = 256
 _MADE_FROM = "umbra_made_from"
 
 
-def ensure_colours() -> bpy.types.Image:
-    """The table of the colours of black bodies, evenly spaced in ln(T), as an image."""
+def ensure_colors() -> bpy.types.Image:
+    """The table of the colors of black bodies, evenly spaced in ln(T), as an image."""
 
     def pixels() -> NDArray:
-        kelvin = np.geomspace(disk_look.COLDEST, disk_look.HOTTEST, COLOUR_ROWS)
-        return disk_look.seen_colour(kelvin)[:, None, :]
+        kelvin = np.geomspace(disk_look.COLDEST, disk_look.HOTTEST, COLOR_ROWS)
+        return disk_look.seen_color(kelvin)[:, None, :]
 
-    return _ensure(COLOURS_NAME, f"{COLOUR_ROWS}", pixels)
+    return _ensure(COLORS_NAME, f"{COLOR_ROWS}", pixels)
 
 
 def streaks() -> NDArray:
@@ -101,9 +101,9 @@ def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
         if not image.is_float:  # as it lies in the file
             if image.colorspace_settings.name == "sRGB":
-                colour = pixels[..., :3]
-                linear = ((colour + 0.055) / 1.055) ** 2.4
-                pixels[..., :3] = np.where(colour <= 0.04045, colour / 12.92, linear)
+                color = pixels[..., :3]
+                linear = ((color + 0.055) / 1.055) ** 2.4
+                pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, linear)
             pixels[..., :3] *= pixels[..., 3:]
         return pixels.mean(axis=1).astype(np.float64)
     finally:
@@ -113,5 +113,5 @@ def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
 def remove_unused() -> None:
     """Remove those of the pictures that nothing uses any more."""
     for image in list(bpy.data.images):
-        if image.name.startswith((FORMER_PROFILE_NAME, COLOURS_NAME, TEXTURE_NAME)) and image.users == 0:
+        if image.name.startswith((FORMER_PROFILE_NAME, COLORS_NAME, TEXTURE_NAME)) and image.users == 0:
             bpy.data.images.remove(image)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is inside the node groups "Umbra Disk": from a map's disk passes to a premultiplied picture, in float32.
 
-The same picture as `physics.disk_render` in float64, term by term, with a table of the colours of black bodies over the
+The same picture as `physics.disk_render` in float64, term by term, with a table of the colors of black bodies over the
 temperature (see `disk_images`).
 """
 
@@ -26,7 +26,7 @@ class DiskInputs:
     """Output sockets of the Group Input node; what they mean is said where they are declared, in `disk_group`."""
 
     disk_pass: Socket
-    colours: Socket
+    colors: Socket
     texture: Socket
     phase: Socket
     first_turn: Socket
@@ -41,10 +41,10 @@ class DiskInputs:
     page_thorne: Socket
     exponent: Socket
     temperature: Socket
-    doppler_colour: Socket
+    doppler_color: Socket
     doppler_brightness: Socket
     beaming: Socket
-    colour_variation: Socket
+    color_variation: Socket
     falloff: Socket
     exposure: Socket
     opacity: Socket
@@ -68,7 +68,7 @@ class _Shared:
     brightness_power: Socket
     temperature_power: Socket
     brightness: Socket
-    colour_rows: Socket
+    color_rows: Socket
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,12 @@ def build_image(
     """Add all nodes that draw one image of the disk behind those in front of it.
 
     Taken and returned are the light of the disk so far and the share of what is behind that is left. With `picture`,
-    the texture's colours are the disk's, and its alpha is the density.
+    the texture's colors are the disk's, and its alpha is the density.
     """
     with builder.frame("Once for all pixels"):
         shared = _share(builder, inputs)
     with builder.frame("Place"):
-        radius, phi, g, coverage = builder.separate_colour(inputs.disk_pass)
+        radius, phi, g, coverage = builder.separate_color(inputs.disk_pass)
         depth = _depth(builder, inputs, shared, radius)
     with builder.frame("Streaks and clumps"):
         place = radius, phi, depth
@@ -107,15 +107,15 @@ def build_image(
             full = builder.math("MINIMUM", 1.0, builder.math("MULTIPLY", thick, disk_look.OPACITY_REACH))
     with builder.frame("Light"):
         if picture:
-            colour = _tinted_light(builder, inputs, shared, radius, g, tint)
+            color = _tinted_light(builder, inputs, shared, radius, g, tint)
         else:
-            colour = _emission(builder, inputs, shared, radius, g)
+            color = _emission(builder, inputs, shared, radius, g)
             dense = builder.math("POWER", thick, builder.math("SUBTRACT", inputs.gain, 1.0))
-            colour = builder.vector_scale(colour, dense)
+            color = builder.vector_scale(color, dense)
     with builder.frame("In front of what is behind"):
         alpha = builder.math("MULTIPLY", builder.math("MULTIPLY", full, inputs.opacity), coverage)
         share = builder.math("MULTIPLY", alpha, through)
-        light = builder.vector_math("ADD", builder.vector_scale(colour, share), light)
+        light = builder.vector_math("ADD", builder.vector_scale(color, share), light)
         return light, builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, alpha), through)
 
 
@@ -138,14 +138,14 @@ def build_whole(
         )
         alpha, _, _ = builder.separate(alphas)
         alpha = builder.select(whole, 1.0, alpha)
-        disk = builder.combine_colour(red, green, blue, alpha)
+        disk = builder.combine_color(red, green, blue, alpha)
     with builder.frame("Over what is behind"):
         left = builder.math("SUBTRACT", 1.0, alpha)
         channels = (
             builder.math("MULTIPLY_ADD", back, left, front)
-            for back, front in zip(builder.separate_colour(behind), (red, green, blue, alpha), strict=True)
+            for back, front in zip(builder.separate_color(behind), (red, green, blue, alpha), strict=True)
         )
-        return disk, builder.combine_colour(*channels)
+        return disk, builder.combine_color(*channels)
 
 
 def _share(builder: TreeBuilder, inputs: DiskInputs) -> _Shared:
@@ -166,9 +166,9 @@ def _share(builder: TreeBuilder, inputs: DiskInputs) -> _Shared:
             for phase, share, turn in zip(phases, shares, (inputs.first_turn, inputs.second_turn), strict=True)
         ),
         brightness_power=builder.math("MULTIPLY", inputs.beaming, inputs.doppler_brightness),
-        temperature_power=builder.math("MULTIPLY", inputs.colour_variation, 0.25),
+        temperature_power=builder.math("MULTIPLY", inputs.color_variation, 0.25),
         brightness=builder.math("POWER", 2.0, inputs.exposure),
-        colour_rows=_rows(builder, inputs.colours),
+        color_rows=_rows(builder, inputs.colors),
     )
 
 
@@ -266,16 +266,16 @@ def _places(
 def _moving_picture(
     builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, place: tuple[Socket, Socket, Socket]
 ) -> tuple[Socket, Socket]:
-    """Colour (not premultiplied) and alpha of a picture whose two patterns are mixed as they are."""
-    colour: Socket | None = None
+    """Color (not premultiplied) and alpha of a picture whose two patterns are mixed as they are."""
+    color: Socket | None = None
     alpha: Socket | None = None
     for (u, v), (_, share, _, _) in zip(_places(builder, inputs, shared, place), shared.patterns, strict=True):
         one, covered = sample_with_alpha(builder, inputs.texture, u, v)
         one, covered = builder.vector_scale(one, share), builder.math("MULTIPLY", covered, share)
-        colour = one if colour is None else builder.vector_math("ADD", colour, one)
+        color = one if color is None else builder.vector_math("ADD", color, one)
         alpha = covered if alpha is None else builder.math("ADD", alpha, covered)
     inverse = builder.math("DIVIDE", 1.0, builder.math("MAXIMUM", disk_look.SMALLEST_ALPHA, alpha))
-    return builder.vector_scale(colour, inverse), _clamped(builder, alpha, 0.0, 1.0)
+    return builder.vector_scale(color, inverse), _clamped(builder, alpha, 0.0, 1.0)
 
 
 def _moving_texture(
@@ -324,23 +324,23 @@ def _emission(builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, radius:
     flux = _flux(builder, inputs, shared.flux, radius)
     shift = builder.math("MAXIMUM", disk_look.SMALLEST_G, g)
     cooling = builder.math("POWER", builder.math("MAXIMUM", _SMALLEST_FLUX, flux), shared.temperature_power)
-    seen = builder.math("POWER", shift, inputs.doppler_colour)
+    seen = builder.math("POWER", shift, inputs.doppler_color)
     temperature = builder.math("MULTIPLY", builder.math("MULTIPLY", inputs.temperature, cooling), seen)
     temperature = _clamped(builder, temperature, disk_look.COLDEST, disk_look.HOTTEST)
     log = builder.math("SUBTRACT", builder.math("LOGARITHM", temperature, math.e), _LOWEST)
     place = builder.math("MULTIPLY", log, 1.0 / (_HIGHEST - _LOWEST))
-    colour = _look_up(builder, inputs.colours, shared.colour_rows, place)
-    return builder.vector_scale(colour, _brightness(builder, inputs, shared, flux, shift))
+    color = _look_up(builder, inputs.colors, shared.color_rows, place)
+    return builder.vector_scale(color, _brightness(builder, inputs, shared, flux, shift))
 
 
 def _tinted_light(
-    builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, radius: Socket, g: Socket, colour: Socket
+    builder: TreeBuilder, inputs: DiskInputs, shared: _Shared, radius: Socket, g: Socket, color: Socket
 ) -> Socket:
-    """Light of a place that has a colour of its own; see `physics.disk_look.tinted_light`."""
+    """Light of a place that has a color of its own; see `physics.disk_look.tinted_light`."""
     flux = _flux(builder, inputs, shared.flux, radius)
     shift = builder.math("MAXIMUM", disk_look.SMALLEST_G, g)
-    gain = redshift_gain(builder, builder.math("DIVIDE", 1.0, shift), inputs.doppler_colour, 0.0, inputs.temperature)
-    light = builder.vector_scale(colour, _brightness(builder, inputs, shared, flux, shift))
+    gain = redshift_gain(builder, builder.math("DIVIDE", 1.0, shift), inputs.doppler_color, 0.0, inputs.temperature)
+    light = builder.vector_scale(color, _brightness(builder, inputs, shared, flux, shift))
     return builder.vector_math("MULTIPLY", light, gain)
 
 

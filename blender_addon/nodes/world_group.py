@@ -2,7 +2,7 @@
 """The shader node group "Umbra World": its sockets, its version, and keeping it whole.
 
 Its Vector takes the place of Texture Coordinate > Generated in front of whatever makes the World's sky; its Tint
-multiplies, and its Fault is added to, the colour that comes out of it. Each lensed World has a group of its own,
+multiplies, and its Fault is added to, the color that comes out of it. Each lensed World has a group of its own,
 because the map is read inside of it.
 """
 
@@ -41,17 +41,17 @@ VECTOR = SocketSpec(
     "Vector", "NodeSocketVector", "Where the light comes from: in place of Generated coordinates", in_out="OUTPUT"
 )
 TINT = SocketSpec(
-    "Tint", "NodeSocketVector", "What the sky's colour is multiplied by: redshift, exposure, shadow", in_out="OUTPUT"
+    "Tint", "NodeSocketVector", "What the sky's color is multiplied by: redshift, exposure, shadow", in_out="OUTPUT"
 )
 FAULT = SocketSpec(
-    "Fault", "NodeSocketVector", "What is added to the sky's colour: magenta without a valid map", in_out="OUTPUT"
+    "Fault", "NodeSocketVector", "What is added to the sky's color: magenta without a valid map", in_out="OUTPUT"
 )
 
 INPUTS = (
     LENSING,
     OTHER_RAYS,
     black_hole_group.EXPOSURE,
-    black_hole_group.REDSHIFT_COLOUR,
+    black_hole_group.REDSHIFT_COLOR,
     black_hole_group.REDSHIFT_BRIGHTNESS,
     black_hole_group.TEMPERATURE,
 )

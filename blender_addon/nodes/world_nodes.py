@@ -34,7 +34,7 @@ class WorldInputs:
     lensing: Socket
     other_rays: Socket
     exposure: Socket
-    redshift_colour: Socket
+    redshift_color: Socket
     redshift_brightness: Socket
     temperature: Socket
 
@@ -110,9 +110,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         one_plus_z = builder.math("ADD", header.constant, builder.dot(looking, header.shift))
         # what is no map must not make numbers that are none
         one_plus_z = builder.math("MAXIMUM", reference_render.SMALLEST_ONE_PLUS_Z, one_plus_z)
-        gain = redshift_gain(
-            builder, one_plus_z, inputs.redshift_colour, inputs.redshift_brightness, inputs.temperature
-        )
+        gain = redshift_gain(builder, one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
     with builder.frame("Results"):
         shown = builder.math("MULTIPLY", visible, builder.math("MULTIPLY", stamped, found))
         tint = builder.select_vector(shown, (0.0, 0.0, 0.0), gain)
@@ -128,7 +126,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
 
 
 def _texel(builder: TreeBuilder, across: Value, height: Value) -> tuple[Socket, Socket]:
-    """Colour and alpha of the texel at texture coordinates; round and round across."""
+    """Color and alpha of the texel at texture coordinates; round and round across."""
     place = builder.combine(across, height, 0.0)
     node = builder.node("ShaderNodeTexImage")
     node.interpolation = "Closest"

@@ -20,7 +20,7 @@ BEFORE = "umbra_lens_before"
 
 # The scene's settings and the group's sockets that say the same.
 SHARED = {
-    "redshift_colour": "Redshift Colour",
+    "redshift_color": "Redshift Color",
     "redshift_brightness": "Redshift Brightness",
     "sky_temperature": "Sky Temperature",
 }

@@ -19,14 +19,14 @@ SIDE = 192
 # Rows of the sky that is looked up: a texel of it is a pixel of the thumbnail, about.
 SKY_ROWS = 256
 
-# Where the sky cannot be read, squares of 10 degrees in two greys stand for it.
+# Where the sky cannot be read, squares of 10 degrees in two grays stand for it.
 SQUARES = 18
-GREYS = (0.02, 0.12)
+GRAYS = (0.02, 0.12)
 
 # Arguments of `reference_render.render`, and the groups' sockets that say the same.
 _SOCKETS = {
     "exposure": "Exposure",
-    "colour_amount": "Redshift Colour",
+    "color_amount": "Redshift Color",
     "brightness_amount": "Redshift Brightness",
     "temperature": "Sky Temperature",
 }
@@ -121,7 +121,7 @@ def look(scene: bpy.types.Scene) -> dict[str, object]:
     """How the sky is placed and shifted, as `reference_render.render` takes it; as it is where that cannot be read."""
     settings = scene.umbra
     values: dict[str, object] = {
-        "colour_amount": settings.redshift_colour,
+        "color_amount": settings.redshift_color,
         "brightness_amount": settings.redshift_brightness,
         "temperature": settings.sky_temperature,
     }
@@ -175,11 +175,11 @@ def _squares() -> np.ndarray:
     row, column = np.mgrid[0:SKY_ROWS, 0 : 2 * SKY_ROWS]
     size = SKY_ROWS / SQUARES
     odd = ((row // size + column // size) % 2).astype(int)
-    return np.repeat(np.array(GREYS)[odd][..., None], 3, axis=-1)
+    return np.repeat(np.array(GRAYS)[odd][..., None], 3, axis=-1)
 
 
 def _shrunk(image: bpy.types.Image) -> np.ndarray:
-    """An image's colours at the thumbnail's resolution, scene-linear."""
+    """An image's colors at the thumbnail's resolution, scene-linear."""
     width, height = image.size
     if width * height == 0:
         return _squares()

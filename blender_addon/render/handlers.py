@@ -159,7 +159,7 @@ def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
 
 @persistent
 def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
-    """The render is complete or cancelled.
+    """The render is complete or canceled.
 
     After a failure the map stays away: the window runs the compositor once more when the render is over, and an
     older map would then hide the magenta.
@@ -169,12 +169,12 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     live_preview.resume()
     if scene.name in _rendering:
         _rendering.discard(scene.name)
-        if scene.name in _waiting:  # cancelled half-way
+        if scene.name in _waiting:  # canceled half-way
             _waiting.discard(scene.name)
             lens_disk.point_at_passes(scene)
         lens_render.end(scene)
         return
-    if scene.name in _waiting:  # cancelled half-way
+    if scene.name in _waiting:  # canceled half-way
         _waiting.discard(scene.name)
         compositor_sync.refresh(scene)
         if world_sync.is_on(scene):

@@ -96,19 +96,19 @@ def read_world(scene: bpy.types.Scene) -> Sky:
         raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
     uses_nodes = bpy.app.version >= (5, 0) or world.use_nodes
     if not uses_nodes or world.node_tree is None:
-        raise SceneError(f'World "{world.name}" is a plain colour and has no environment: {_HELP}.')
+        raise SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.')
     engine = "CYCLES" if scene.render.engine == "CYCLES" else "EEVEE"
     output = world.node_tree.get_output_node(engine)
     surface = _source(output.inputs["Surface"]) if output is not None else None
     if surface is None or surface.node.type != "BACKGROUND":
         raise SceneError(f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.')
     background = surface.node
-    colour = _source(background.inputs["Color"])
-    if colour is None:
-        raise SceneError(f'World "{world.name}" is a plain colour and has no environment: {_HELP}.')
-    if colour.node.type != "TEX_ENVIRONMENT":
+    color = _source(background.inputs["Color"])
+    if color is None:
+        raise SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.')
+    if color.node.type != "TEX_ENVIRONMENT":
         raise SceneError(
-            f'World "{world.name}" makes its colour with the node "{colour.node.name}", which cannot be '
+            f'World "{world.name}" makes its color with the node "{color.node.name}", which cannot be '
             f"taken over: {_HELP}."
         )
     if background.inputs["Strength"].is_linked:
@@ -116,7 +116,7 @@ def read_world(scene: bpy.types.Scene) -> Sky:
             f'The strength of World "{world.name}" is driven by other nodes, which cannot be followed: set '
             "it as a number."
         )
-    texture = colour.node
+    texture = color.node
     if texture.image is None:
         raise SceneError(f'The Environment Texture of World "{world.name}" has no image: choose one.')
     if texture.projection != "EQUIRECTANGULAR":

@@ -44,7 +44,7 @@ class Shot:
 
     @property
     def distance(self) -> float:
-        """Distance of the camera from the hole's centre, in units of M."""
+        """Distance of the camera from the hole's center, in units of M."""
         return float(np.linalg.norm(self.parameters.camera_position))
 
 
@@ -167,7 +167,7 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
 def camera_velocity(
     scene: bpy.types.Scene, hole: bpy.types.Object, camera: bpy.types.Object, view_layer: bpy.types.ViewLayer
 ) -> Vector:
-    """Velocity of the camera relative to the hole's centre at the current frame, scene units a second.
+    """Velocity of the camera relative to the hole's center at the current frame, scene units a second.
 
     Central difference between half a frame earlier and half a frame later, along the scene's world axes.
     """

@@ -16,7 +16,7 @@ BEAMINGS = {"BOLOMETRIC": disk_look.BOLOMETRIC, "MONOCHROMATIC": disk_look.MONOC
 MOST_IMAGES = physics.MOST_CROSSINGS
 
 # How the artist's picture is used; identifiers are saved in files.
-DENSITY, COLOUR = "DENSITY", "COLOUR"
+DENSITY, COLOR = "DENSITY", "COLOR"
 
 # With a new disk, the inner edge turns round in some four seconds.
 DEFAULT_SPEED = 12.0
@@ -28,9 +28,9 @@ LOOK_FIELDS = (
     "profile",
     "exponent",
     "temperature",
-    "doppler_colour",
+    "doppler_color",
     "doppler_brightness",
-    "colour_variation",
+    "color_variation",
     "falloff",
     "exposure",
     "opacity",
@@ -135,7 +135,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     )
     temperature: bpy.props.FloatProperty(
         name="Temperature",
-        description="Where the disk is brightest, kelvin: it decides the colour",
+        description="Where the disk is brightest, kelvin: it decides the color",
         default=_LOOK.temperature,
         min=disk_look.COLDEST,
         max=disk_look.HOTTEST,
@@ -144,10 +144,10 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         subtype="COLOR_TEMPERATURE",
         update=_changed,
     )
-    doppler_colour: _amount(
-        "Doppler Colour",
-        "doppler_colour",
-        "How much motion and gravity change the disk's colour: 0 not at all, 1 as physics has it",
+    doppler_color: _amount(
+        "Doppler Color",
+        "doppler_color",
+        "How much motion and gravity change the disk's color: 0 not at all, 1 as physics has it",
     )
     doppler_brightness: _amount(
         "Doppler Brightness",
@@ -160,14 +160,14 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         description="What the brightness counts",
         items=(
             ("BOLOMETRIC", "All Light", "The light of all wavelengths: the frequency ratio to the power of 4", 0),
-            ("MONOCHROMATIC", "One Colour", "The light of a narrow band: the frequency ratio to the power of 3", 1),
+            ("MONOCHROMATIC", "One Color", "The light of a narrow band: the frequency ratio to the power of 3", 1),
         ),
         default="BOLOMETRIC",
         update=_changed,
         options=set(),
     )
-    colour_variation: _amount(
-        "Colour Variation", "colour_variation", "How much cooler the dim parts are: at 0 the disk has one temperature"
+    color_variation: _amount(
+        "Color Variation", "color_variation", "How much cooler the dim parts are: at 0 the disk has one temperature"
     )
     falloff: _amount("Falloff", "falloff", "How far the brightness follows the profile: at 0 it is the same throughout")
     exposure: bpy.props.FloatProperty(
@@ -216,7 +216,7 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         description="What the picture says about the disk",
         items=(
             (DENSITY, "Streaks", "How dense it is: red thins it by Streaks, green by Clumps", 0),
-            (COLOUR, "Colour", "Its colours are the disk's own, not those of hot matter; its alpha is the density", 1),
+            (COLOR, "Color", "Its colors are the disk's own, not those of hot matter; its alpha is the density", 1),
         ),
         default=DENSITY,
         update=_changed,
@@ -252,8 +252,8 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
 
 
 def shows_picture(settings: UmbraDiskProperties) -> bool:
-    """Whether the disk has the colours of the artist's picture."""
-    return settings.texture is not None and settings.texture_use == COLOUR
+    """Whether the disk has the colors of the artist's picture."""
+    return settings.texture is not None and settings.texture_use == COLOR
 
 
 def disk_of(settings: UmbraDiskProperties) -> "physics.Disk | None":

@@ -62,7 +62,7 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
 
     is_black_hole: bpy.props.BoolProperty(
         name="Black Hole",
-        description="This object is a black hole: its origin is the centre, its local Z the axis of rotation",
+        description="This object is a black hole: its origin is the center, its local Z the axis of rotation",
         default=False,
         update=_changed,
         options=set(),
@@ -92,7 +92,7 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
     )
     motion: bpy.props.EnumProperty(
         name="Camera Motion",
-        description="How the camera moves: this shifts directions (aberration) and colours (Doppler effect)",
+        description="How the camera moves: this shifts directions (aberration) and colors (Doppler effect)",
         items=(
             (
                 "FIDO",
@@ -188,9 +188,9 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         soft_max=50.0,
         update=lambda settings, _context: _refresh(settings),
     )
-    redshift_colour: bpy.props.FloatProperty(
-        name="Redshift Colour",
-        description="How much the change of frequency changes colours: 0 not at all, 1 as physics has it",
+    redshift_color: bpy.props.FloatProperty(
+        name="Redshift Color",
+        description="How much the change of frequency changes colors: 0 not at all, 1 as physics has it",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -208,7 +208,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
     sky_temperature: bpy.props.FloatProperty(
         name="Sky Temperature",
-        description="Temperature of the light, in kelvin, that the colour shift assumes",
+        description="Temperature of the light, in kelvin, that the color shift assumes",
         default=color.DEFAULT_TEMPERATURE,
         min=500.0,
         soft_max=40000.0,

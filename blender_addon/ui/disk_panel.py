@@ -70,7 +70,7 @@ class VIEW3D_PT_umbra_disk(HolePanel, bpy.types.Panel):
         layout.prop(settings, "beaming")
         column = layout.column(align=True)
         column.use_property_split = False  # the names are too long to stand beside their fields
-        column.prop(settings, "doppler_colour")
+        column.prop(settings, "doppler_color")
         column.prop(settings, "doppler_brightness")
         layout.prop(settings, "light")
         if settings.light:
@@ -90,7 +90,7 @@ class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
         layout.prop(settings, "profile")
         if settings.profile == "power_law":
             layout.prop(settings, "exponent")
-        for name in ("falloff", "colour_variation", "inner_softness", "outer_softness"):
+        for name in ("falloff", "color_variation", "inner_softness", "outer_softness"):
             layout.prop(settings, name)
         layout.separator()
         layout.template_ID(settings, "texture", open="image.open", text="Texture")

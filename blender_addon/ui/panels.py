@@ -10,7 +10,7 @@ from ..settings.properties import CAMERA_ANIMATION, COMPOSITOR
 from . import operators, status
 from .sidebar import UmbraPanel
 
-LOOK_CONTROLS = ("Exposure", "Redshift Colour", "Redshift Brightness", "Sky Temperature")
+LOOK_CONTROLS = ("Exposure", "Redshift Color", "Redshift Brightness", "Sky Temperature")
 PLACEMENT_CONTROLS = ("Environment Rotation", "Environment Strength")
 
 
@@ -129,7 +129,7 @@ class VIEW3D_PT_umbra_lens(UmbraPanel, bpy.types.Panel):
         settings = context.scene.umbra
         layout.prop(settings, "lens_rays")
         layout.prop(settings, "sphere_radius")
-        layout.prop(settings, "redshift_colour")
+        layout.prop(settings, "redshift_color")
         layout.prop(settings, "redshift_brightness")
         layout.prop(settings, "sky_temperature")
         layout.prop(settings, "cpu_fallback")

@@ -14,7 +14,7 @@ from .sidebar import HolePanel, UmbraPanel
 # Of the thumbnail, in units of the interface.
 SCALE = 9.0
 
-CONTROLS = ("Exposure", "Redshift Colour", "Redshift Brightness", "Sky Temperature")
+CONTROLS = ("Exposure", "Redshift Color", "Redshift Brightness", "Sky Temperature")
 
 
 class UMBRA_OT_toggle_lensing(bpy.types.Operator):

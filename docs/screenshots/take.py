@@ -26,8 +26,8 @@ from build_extension import build, current_platform  # noqa: E402  found only no
 WINDOW = (1400, 1200)
 LARGEST = 150_000
 """Bytes that one picture may have."""
-COLOURS = (256, 128, 64, 32)
-"""Numbers of colours tried until a picture is that small."""
+COLORS = (256, 128, 64, 32)
+"""Numbers of colors tried until a picture is that small."""
 TIMEOUT = 600  # seconds
 POLL_INTERVAL = 0.1  # seconds
 
@@ -57,8 +57,8 @@ def take(request: Path, environment: dict[str, str]) -> None:
     command = ["convert", str(whole), "-crop", f"{width}x{height}+{left}+{top}", "+repage"]
     if wanted["trim"]:
         command += ["-fuzz", "1%", "-trim", "+repage", "-bordercolor", "#303030", "-border", "4"]
-    for colours in COLOURS:
-        written = [*command, "-strip", "+dither", "-colors", str(colours), "-define", "png:compression-level=9"]
+    for colors in COLORS:
+        written = [*command, "-strip", "+dither", "-colors", str(colors), "-define", "png:compression-level=9"]
         subprocess.run([*written, f"PNG8:{cut}"], check=True)
         if cut.stat().st_size <= LARGEST:
             break
@@ -68,7 +68,7 @@ def take(request: Path, environment: dict[str, str]) -> None:
         cut.unlink()
     elif wanted["keep"]:
         shutil.copy(cut, HERE)
-        print(f"{cut.name}: {cut.stat().st_size / 1000:.0f} kB, {colours} colours", flush=True)
+        print(f"{cut.name}: {cut.stat().st_size / 1000:.0f} kB, {colors} colors", flush=True)
     request.unlink()  # Blender goes on
 
 

@@ -30,7 +30,7 @@ from ..maps.painting import UNRESOLVED_ONE_PLUS_Z
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..numerics.sphere import unit_vectors
 from ..sampling.view import View
-from ..sampling.visibility import cells_for_shadow, centre_block, refine
+from ..sampling.visibility import cells_for_shadow, center_block, refine
 from ..shot.map_parameters import WarpMapParameters
 from .accuracy_report import AccuracyReport, DiskAccuracy
 from .accuracy_samples import Samples, choose
@@ -200,20 +200,20 @@ def _visibility(parameters: WarpMapParameters, samples: Samples) -> Generator[fl
         block = slice(start, start + EDGE_BLOCK)
         shares[block], _, _ = refine(samples.column[block], samples.row[block], view.edge, CELLS)
         yield min(start + EDGE_BLOCK, len(samples)) / len(samples)
-    centre = view.centre()
-    if centre is not None:  # a distant hole is smaller than those cells
-        column, row = centre_block(centre, *parameters.map_size)
+    center = view.center()
+    if center is not None:  # a distant hole is smaller than those cells
+        column, row = center_block(center, *parameters.map_size)
         width = parameters.map_size[0]
         small = np.flatnonzero(np.isin(samples.row * width + samples.column, row * width + column))
         if len(small):
-            cells = max(CELLS, cells_for_shadow(centre, view.edge))
+            cells = max(CELLS, cells_for_shadow(center, view.edge))
             shares[small], _, _ = refine(samples.column[small], samples.row[small], view.edge, cells)
     return shares
 
 
 @dataclass(frozen=True)
 class _Rays:
-    """What the reference finds at the centres of sampled pixels."""
+    """What the reference finds at the centers of sampled pixels."""
 
     fate: NDArray[np.uint8]
     direction: Array
@@ -222,7 +222,7 @@ class _Rays:
 
 
 def _trace(pixels: _Pixels, samples: Samples) -> Generator[float, None, _Rays]:
-    """Trace the centres of sampled pixels by the reference method."""
+    """Trace the centers of sampled pixels by the reference method."""
     view = View(pixels.parameters)
     count = len(samples)
     fate = np.empty(count, np.uint8)
@@ -230,7 +230,7 @@ def _trace(pixels: _Pixels, samples: Samples) -> Generator[float, None, _Rays]:
     one_plus_z = np.empty(count)
     for start in range(0, count, RAY_BLOCK):
         block = slice(start, start + RAY_BLOCK)
-        rays = view.rays(*samples.centres(block))
+        rays = view.rays(*samples.centers(block))
         one_plus_z[block] = rays.one_plus_z
         if pixels.impact is not None:
             fate[block], direction[block], impact[block] = exit_lines(rays, REFERENCE_TOLERANCE, REFERENCE_METHOD)
@@ -252,7 +252,7 @@ def _judge_passes(
     lost = np.empty(len(samples), dtype=bool)
     for start in range(0, len(samples), RAY_BLOCK):
         block = slice(start, start + RAY_BLOCK)
-        found, light = view.crossings(*samples.centres(block), last, DISK_TOLERANCE, REFERENCE_METHOD)
+        found, light = view.crossings(*samples.centers(block), last, DISK_TOLERANCE, REFERENCE_METHOD)
         with np.errstate(all="ignore"):  # beyond a ray's end, where a pass holds nothing
             radius[:, block] = np.where(found.u > 0.0, 1.0 / found.u, np.inf)
             g[:, block] = light.g(parameters.spin, found.u, found.u_slope, parameters.disk.retrograde)
@@ -296,7 +296,7 @@ def _report(
 ) -> AccuracyReport:
     place = (samples.row, samples.column)
     kind = pixels.kind[place]
-    if pixels.impact is not None:  # an exit map knows centres alone
+    if pixels.impact is not None:  # an exit map knows centers alone
         visibility = np.where(rays.fate == Fate.SHADOW, 0.0, 1.0)
     apart = np.abs(pixels.visibility[place] - visibility)
     # A ray that the reference gave up tells nothing; its pixel's visible share does.

@@ -25,7 +25,7 @@ class DiskAccuracy:
     g: float
     """Largest error of g, relative."""
     differing: int
-    """Samples whose centre the reference sees on the disk and the pass has no part of the disk, or the reverse."""
+    """Samples whose center the reference sees on the disk and the pass has no part of the disk, or the reverse."""
     reference_unresolved: int
     """Samples that the reference itself gave up."""
 

@@ -17,13 +17,13 @@ Mask = NDArray[np.bool_]
 Pixels = NDArray[np.intp]
 Image = NDArray[np.float32]
 
-# Of all samples, so many are spread evenly; the others lie at the shadow's edge, where neighbours differ most, and
-# where pixels do not fit their neighbours, in equal parts.
+# Of all samples, so many are spread evenly; the others lie at the shadow's edge, where neighbors differ most, and
+# where pixels do not fit their neighbors, in equal parts.
 EVEN_SHARE = 0.5
 
 # Pixels from the shadow's edge that count as next to it.
 EDGE_REACH = 2
-# Half of the samples where neighbours differ most are the very first, the others are drawn from this share of the map.
+# Half of the samples where neighbors differ most are the very first, the others are drawn from this share of the map.
 STEEP_SHARE = 0.02
 # Pixels on each side that a pixel is compared with. Of each square of so many the one that fits worst is looked at.
 REACH, SQUARE = 2, 16
@@ -43,8 +43,8 @@ class Samples:
     def __len__(self) -> int:
         return len(self.column)
 
-    def centres(self, block: slice) -> tuple[Array, Array]:
-        """Return the map pixel coordinates of some pixels' centres, shape (n,) each."""
+    def centers(self, block: slice) -> tuple[Array, Array]:
+        """Return the map pixel coordinates of some pixels' centers, shape (n,) each."""
         return self.column[block].astype(np.float64) + 0.5, self.row[block].astype(np.float64) + 0.5
 
 
@@ -56,9 +56,9 @@ def choose(
     Parameters
     ----------
     kind : ndarray of uint8, shape (height, width)
-        What each pixel sees; where neighbours differ is the shadow's edge.
+        What each pixel sees; where neighbors differ is the shadow's edge.
     whole : ndarray of bool, shape (height, width)
-        Pixels whose direction may be compared with their neighbours'.
+        Pixels whose direction may be compared with their neighbors'.
     direction : ndarray, shape (height, width, 3)
         Unit vectors, of any kind of float.
     count : int
@@ -112,7 +112,7 @@ def _near_edge(kind: NDArray[np.uint8]) -> Mask:
 
 
 def _unevenness(whole: Mask, direction: NDArray[Any]) -> Generator[float, None, tuple[Image, Image]]:
-    """Return how far pixels are from the next, radians, and how badly they fit their neighbours, a ratio.
+    """Return how far pixels are from the next, radians, and how badly they fit their neighbors, a ratio.
 
     Both of shape (height, width), 0 where there is nothing to compare. Only the pixel of each square that fits worst
     has a ratio, to what is usual in the square: next to the photon ring, few fit.
@@ -147,9 +147,9 @@ def _steps(values: Array) -> Array:
 
 
 def _misfit(values: Array) -> Array:
-    """Return how far pixels are from the cubic through two neighbours on each side, shape (height, width).
+    """Return how far pixels are from the cubic through two neighbors on each side, shape (height, width).
 
-    The smaller of what row and column say: a wrong pixel does not fit in either, its neighbours do in one. NaN where
+    The smaller of what row and column say: a wrong pixel does not fit in either, its neighbors do in one. NaN where
     neither can be told.
     """
     misfit = np.full(values.shape[:2], np.nan)

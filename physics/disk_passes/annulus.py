@@ -46,7 +46,7 @@ def share_above(height: Array, slope_x: Array, slope_y: Array) -> Array:
 
 
 def coverage(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> Array:
-    """Return the share of each pixel where u is between two values; `u` at its centre, and its change from pixel to
+    """Return the share of each pixel where u is between two values; `u` at its center, and its change from pixel to
     pixel."""
     share = share_above(u - low, slope_x, slope_y) - share_above(u - high, slope_x, slope_y)
     share = np.where(share < LEAST_COVERAGE, 0.0, share)
@@ -54,7 +54,7 @@ def coverage(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) 
 
 
 def nearest_covered(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> tuple[Array, Array, Array]:
-    """Return u brought between two values, and how many pixels right and down of the centre it is met, at most half of
+    """Return u brought between two values, and how many pixels right and down of the center it is met, at most half of
     one."""
     inside = np.clip(u, low, high)
     away = (inside - u) / np.maximum(slope_x * slope_x + slope_y * slope_y, FLAT * FLAT)
@@ -81,7 +81,7 @@ def near_annulus(u: Array, low: float, high: float) -> NDArray[np.bool_]:
 
 
 def _around(values: Array, extreme: np.ufunc) -> Array:
-    """Return the largest or smallest of each value and its eight neighbours, shape (n, rows, columns)."""
+    """Return the largest or smallest of each value and its eight neighbors, shape (n, rows, columns)."""
     found = values.copy()
     for axis in (1, 2):
         here = found.copy()

@@ -103,7 +103,7 @@ class DiskPainting:
         self._samples.make_tables()
         rings = self._rings()
         yield 0.1
-        slim, centre = self._slim_disk(), self._view.centre()
+        slim, center = self._slim_disk(), self._view.center()
         sides = sides_for(self._width, self._height)
         waiting = tiles_of(self._width, self._height, sides[0])
         wanted = np.ones((len(waiting), self._crossings), dtype=bool)
@@ -115,8 +115,8 @@ class DiskPainting:
                 wanted[:, order] &= touched[waiting.row // side, waiting.column // side]
             # Samples may miss a disk that is seen from the edge; a whole one, hole and all, where it is small.
             marked = self._marked(waiting, *slim)
-            if centre is not None and (side != TILE_SIDES[-1] or not self._samples.has_tables):
-                marked |= self._marked(waiting, *map(np.atleast_1d, centre))
+            if center is not None and (side != TILE_SIDES[-1] or not self._samples.has_tables):
+                marked |= self._marked(waiting, *map(np.atleast_1d, center))
             group = max(1, BLOCK_SIZE // DISK_POINTS**2)
             for start in range(0, len(waiting), group):
                 part = np.arange(start, min(start + group, len(waiting)))

@@ -53,7 +53,7 @@ class DiskTracing:
         """Pixels whose ray was given up."""
 
     def trace_only(self, order: int, columns: Index, rows: Index) -> Tiles:
-        """Ask for the chosen pixels of a crossing, shape (n,), and none else; neighbours are traced along. Return the
+        """Ask for the chosen pixels of a crossing, shape (n,), and none else; neighbors are traced along. Return the
         smallest tiles that hold any of these."""
         if not len(columns):
             return Tiles(TILE_SIDES[-1], columns, rows)
@@ -121,7 +121,7 @@ class DiskTracing:
         bend = np.abs(np.gradient(across, axis=2)) + np.abs(np.gradient(down, axis=1))
         bend += np.abs(np.gradient(across, axis=1))
         reach = 0.5 * (np.abs(across) + np.abs(down)) + bend
-        # A neighbour may reach further than the mean slope says.
+        # A neighbor may reach further than the mean slope says.
         step_x, step_y = np.abs(np.diff(u, axis=2)), np.abs(np.diff(u, axis=1))
         reach[:, :, 1:], reach[:, :, :-1] = np.maximum(reach[:, :, 1:], step_x), np.maximum(reach[:, :, :-1], step_x)
         reach[:, 1:], reach[:, :-1] = np.maximum(reach[:, 1:], step_y), np.maximum(reach[:, :-1], step_y)
@@ -131,8 +131,8 @@ class DiskTracing:
         needs: Mask = touched & ~whole & (bend > 8.0 * LARGEST_BEND * steep)
         return needs
 
-    def _divide(self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], centres: Array) -> None:
-        """Fill pixels from places on a finer grid inside them, and from their centres, shape (channels, n)."""
+    def _divide(self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], centers: Array) -> None:
+        """Fill pixels from places on a finer grid inside them, and from their centers, shape (channels, n)."""
         group = max(1, BLOCK_SIZE // FINER**2)
         steps = (np.arange(FINER) + 0.5) / FINER
         for start in range(0, len(columns), group):
@@ -153,8 +153,8 @@ class DiskTracing:
             radius, phi, g = self._samples.matter(here)
             matter = mean_matter(radius.T, phi.T, g.T, shares[seen].T)
             whole = share[seen] == 1.0
-            centre = centres[:, start : start + group][:, seen][:, whole]
-            centre[U] = np.clip(centre[U], self._low, self._high)
-            for each, central in zip(matter, self._samples.matter(centre), strict=True):
+            center = centers[:, start : start + group][:, seen][:, whole]
+            center[U] = np.clip(center[U], self._low, self._high)
+            for each, central in zip(matter, self._samples.matter(center), strict=True):
                 each[whole] = central
             self._planes.write(order, (column[seen], row[seen]), matter, share[seen])

@@ -92,7 +92,7 @@ class DiskPlanes:
         self, order: int, tiles: Tiles, coefficients: Channels, reach: NDArray[Any], matter: MatterOf
     ) -> None:
         """Do what `fill` does for some tiles, from coefficients of shape (channels, n, points, points); `reach`: how
-        much u changes at the most from a pixel's centre to its corners, (n,)."""
+        much u changes at the most from a pixel's center to its corners, (n,)."""
         base, _ = _polynomials(tiles.side, coefficients.shape[-1])
         # Of tiles that stick out of the picture no more than is in it.
         down, across = base[: (self._height - tiles.row).max()], base[: (self._width - tiles.column).max()]
@@ -182,7 +182,7 @@ class DiskPlanes:
 
 def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
     """Return the changes from pixel to pixel, along the rows and down, of channels of shape (channels, n, rows,
-    columns) at some places, given by their numbers in (n, rows, columns); none where a neighbour is not known."""
+    columns) at some places, given by their numbers in (n, rows, columns); none where a neighbor is not known."""
     rows, columns = values.shape[-2:]
     flat = values.reshape(len(values), -1)
     step, at = np.array([[1], [columns]]), np.stack([place % columns, place // columns % rows])
@@ -203,7 +203,7 @@ def _polynomials(side: int, count: int) -> tuple[NDArray[np.float32], NDArray[np
 
 def _steepest(coefficients: NDArray[Any], side: int) -> NDArray[Any]:
     """Return how much tiles, given by Chebyshev coefficients of shape (n, points, points), change at the most from a
-    pixel's centre to its corners, shape (n,): from as many places as there are pixels in the smallest tiles."""
+    pixel's center to its corners, shape (n,): from as many places as there are pixels in the smallest tiles."""
     base, slope = _polynomials(TILE_SIDES[-1], coefficients.shape[-1])
     per_pixel = TILE_SIDES[-1] / side
     change = np.abs(base @ coefficients @ slope.T) + np.abs(slope @ coefficients @ base.T)

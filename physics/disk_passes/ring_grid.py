@@ -41,7 +41,7 @@ class Needs:
     tolerance: float
     """Of tracing, radians."""
     pixel: float
-    """The angle between neighbouring pixels in the middle of the picture, radians."""
+    """The angle between neighboring pixels in the middle of the picture, radians."""
     pixel_error: float
     """Share of the change from pixel to pixel that interpolation may be wrong by."""
     place_error: float
@@ -186,7 +186,7 @@ def between(values: Array) -> Array:
 
 
 def _halfway(values: Array, axis: int) -> Array:
-    """Return what is half way between neighbours along an axis, by cubics through four of them."""
+    """Return what is half way between neighbors along an axis, by cubics through four of them."""
     values = np.moveaxis(values, axis, 0)
     middle = 9.0 * (values[1:-2] + values[2:-1]) - (values[:-3] + values[3:])
     ends = [5.0 * one + 15.0 * two - 5.0 * three + four for one, two, three, four in (values[:4], values[:-5:-1])]

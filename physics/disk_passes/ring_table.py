@@ -32,7 +32,7 @@ Mask = NDArray[np.bool_]
 Pairs = NDArray[np.complex128]
 """Two numbers as one, to be looked up together."""
 
-# The column that begins the first cell: its neighbours serve it, and the first of all tells the errors alone.
+# The column that begins the first cell: its neighbors serve it, and the first of all tells the errors alone.
 FIRST_CELL = 2
 
 # Where a band's rims are not well known at this share of the position angles, it is no band.
@@ -41,7 +41,7 @@ ENOUGH_ROWS = 0.75
 # Rounds of Newton's method that find a rim between two columns, where it is nearly straight.
 RIM_ROUNDS = 4
 
-# A node so far off the disk, in units of how uncertain it is, need not be known if its neighbours are off as well.
+# A node so far off the disk, in units of how uncertain it is, need not be known if its neighbors are off as well.
 OFF_MARGIN = 4.0
 
 
@@ -225,7 +225,7 @@ def _continue_inwards(values: Array, inside: Mask) -> None:
 
 
 def _left_out(values: Array, axis: int) -> Array:
-    """Return what cubics through neighbours along an axis leave out at the most, from the nearest fourth difference."""
+    """Return what cubics through neighbors along an axis leave out at the most, from the nearest fourth difference."""
     differences = np.abs(np.diff(values, 4, axis=axis))
     nearest = np.clip(np.arange(values.shape[axis]) - 2, 0, differences.shape[axis] - 1)
     left_out: Array = AROUND_ERROR * differences.take(nearest, axis=axis)

@@ -4,7 +4,7 @@
 The source text's own method, kept as a check of the Mino-time form, with which it shares no equation of motion.
 It has that text's limits, stated rather than hidden: infinity is a large radius; rays that pass close to the
 spin axis, where Eq. 2 contains 1/sin^3 theta, are given up, and so are those so close to the critical curve that
-its exponential parting of neighbours would amplify the integration's own error into a wrong direction.
+its exponential parting of neighbors would amplify the integration's own error into a wrong direction.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ POLE_LIMIT = 1e-3
 DRIFT_LIMIT = 1e4
 
 # Closest approach to the critical curve that is trusted: |R(r_m)| over R''/2 r_m^2, which grows like the distance
-# from it, in multiples of the tolerance. Neighbouring rays part like 1 / distance, so that errors of direction stay
+# from it, in multiples of the tolerance. Neighboring rays part like 1 / distance, so that errors of direction stay
 # below some 1e-3 radians.
 EDGE_LIMIT = 1e4
 

@@ -223,7 +223,7 @@ class TurningRays(MinoSystem):
 class DirectRays(MinoSystem):
     """Rays that go from the camera straight out, with nothing to turn them: u = u_c (1 - x).
 
-    The centre u_c is the camera, or, for a camera inside a barrier that does not turn the ray, the barrier: next to
+    The center u_c is the camera, or, for a camera inside a barrier that does not turn the ray, the barrier: next to
     the critical curve U almost vanishes there, and expanded about it keeps its digits.
     """
 

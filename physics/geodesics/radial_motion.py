@@ -164,8 +164,8 @@ class _Paths:
         from_middle = QuarticMotion(self.function, self.quartic, *middle)
         after, before = from_middle.around(value, slope)
         u, rate = (
-            np.concatenate([later[1:], earlier[1:], centre[None], later[:1]])
-            for later, earlier, centre in zip(after, before, middle, strict=True)
+            np.concatenate([later[1:], earlier[1:], center[None], later[:1]])
+            for later, earlier, center in zip(after, before, middle, strict=True)
         )
         lost = np.maximum(motion.cancellation(value[0], slope[0]), from_middle.cancellation(value[0], slope[0]))
         return u, rate, lost

@@ -329,12 +329,12 @@ class _Series:
         with np.errstate(all="ignore"):  # what comes of impossible rays is not finite, and found by `places`
             way = path.end - path.start
             self.stretched = path.near < STRETCH_BELOW * way
-            self.centre = self._unfold(np.zeros_like(path.near))
+            self.center = self._unfold(np.zeros_like(path.near))
             # how far from there the singularity is once folded: its distance over |dx / dt|
-            near = np.where(self.stretched, path.near, 1.0) / np.abs(self._fold(self.centre)[1])
+            near = np.where(self.stretched, path.near, 1.0) / np.abs(self._fold(self.center)[1])
             self.scale = np.maximum(near, np.finfo(float).tiny)
             low, high = (self._unfold(x) for x in (path.start, path.end))
-            low, high = (np.where(self.stretched, np.arcsinh((t - self.centre) / self.scale), t) for t in (low, high))
+            low, high = (np.where(self.stretched, np.arcsinh((t - self.center) / self.scale), t) for t in (low, high))
             self.half, self.middle = 0.5 * (high - low), 0.5 * (high + low)
             x, step = self.place(points[:, None])
             speed = path.speed(x)
@@ -355,7 +355,7 @@ class _Series:
             chosen = self.stretched
             grown = np.exp(t[..., chosen])
             shrunk, half = 1.0 / grown, 0.5 * self.scale[chosen]
-            t[..., chosen] = self.centre[chosen] + half * (grown - shrunk)
+            t[..., chosen] = self.center[chosen] + half * (grown - shrunk)
             rate = np.ones_like(t)
             rate[..., chosen] = half * (grown + shrunk)
         x, slope = self._fold(t)
@@ -387,7 +387,7 @@ class _Series:
         """Return the series of the chosen rays alone, for `place` and `sums`."""
         part = object.__new__(_Series)
         part.path = self.path.select(chosen)
-        for name in ("half", "middle", "centre", "scale", "stretched"):
+        for name in ("half", "middle", "center", "scale", "stretched"):
             setattr(part, name, getattr(self, name)[chosen])
         part.time_series = self.time_series[:, chosen]
         if self.path.spin != 0.0:

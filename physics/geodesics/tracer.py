@@ -306,7 +306,7 @@ def drain(
     while True:
         if cancel is not None and cancel():
             steps.close()
-            raise Cancelled("The work was cancelled.")
+            raise Cancelled("The work was canceled.")
         try:
             fraction = next(steps)
         except StopIteration as end:

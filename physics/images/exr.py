@@ -170,7 +170,7 @@ def write_channels(
 def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
     """Read an EXR file's R, G, B(, A) as float32, shape (height, width, 3 or 4), row 0 at the top, and its header.
 
-    Luminance-only files are read as grey.
+    Luminance-only files are read as gray.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a gravitational and Doppler shift does to the colour and the brightness of a sky.
+"""What a gravitational and Doppler shift does to the color and the brightness of a sky.
 
 Physics
 -------
@@ -16,10 +16,10 @@ change is
     B(lambda, T / (1 + z)) / B(lambda, T) = (exp(x) - 1) / (exp((1 + z) x) - 1),   x = h c / (lambda k_B T),
 
 at the dominant wavelength lambda of that channel's primary. Summed over all frequencies the intensity
-changes by (1 + z)^-4, and dividing by this leaves the change of colour alone. Both parts can be dialled by
+changes by (1 + z)^-4, and dividing by this leaves the change of color alone. Both parts can be dialled by
 an amount between 0 (no effect) and 1 (the physical effect):
 
-    gain_c = ((1 + z)^4 (exp(x_c) - 1) / (exp((1 + z) x_c) - 1))^colour * (1 + z)^(-4 brightness).
+    gain_c = ((1 + z)^4 (exp(x_c) - 1) / (exp((1 + z) x_c) - 1))^color * (1 + z)^(-4 brightness).
 
 With both amounts at 1 the gain is exactly Planck's ratio.
 
@@ -40,13 +40,13 @@ from ..numerics.checks import number
 from ..numerics.errors import BlackHoleError
 
 SECOND_RADIATION_CONSTANT = 0.014387768775
-"""h c / k_B in metre kelvin (CODATA 2018; exact by the SI's definitions, rounded to the digits written)."""
+"""h c / k_B in meter kelvin (CODATA 2018; exact by the SI's definitions, rounded to the digits written)."""
 
 CHANNEL_WAVELENGTHS = (611.4e-9, 549.1e-9, 464.3e-9)
-"""Dominant wavelengths of the Rec. 709 red, green and blue primaries against D65 white (metres)."""
+"""Dominant wavelengths of the Rec. 709 red, green and blue primaries against D65 white (meters)."""
 
 DEFAULT_TEMPERATURE = 6500.0
-"""Sky temperature (kelvin) whose black body is closest to the D65 white of the picture's colour space."""
+"""Sky temperature (kelvin) whose black body is closest to the D65 white of the picture's color space."""
 
 # Where arithmetic holds: nothing that is seen comes near.
 LARGEST_SHIFT = 1e100
@@ -64,7 +64,7 @@ def _log_of_exp_minus_one(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def redshift_gain(
     one_plus_z: ArrayLike,
-    colour_amount: float = 1.0,
+    color_amount: float = 1.0,
     brightness_amount: float = 1.0,
     temperature: float = DEFAULT_TEMPERATURE,
 ) -> NDArray[np.float64]:
@@ -74,8 +74,8 @@ def redshift_gain(
     ----------
     one_plus_z : array_like, shape (...)
         Frequency ratio source / camera, > 0; above 1 is redshift.
-    colour_amount : float
-        0 keeps the colour, 1 changes it physically.
+    color_amount : float
+        0 keeps the color, 1 changes it physically.
     brightness_amount : float
         0 keeps the brightness, 1 scales the total intensity by (1 + z)^-4.
     temperature : float
@@ -106,13 +106,13 @@ def redshift_gain(
         raise BlackHoleError(
             f"The sky's temperature is {temperature:g} K, it must be positive, from {COLDEST:g} to {HOTTEST:g} K."
         )
-    for amount in (colour_amount, brightness_amount):
+    for amount in (color_amount, brightness_amount):
         if not abs(number(amount, "an amount of redshift")) <= LARGEST_AMOUNT:
             raise BlackHoleError(f"An amount of redshift is {amount:g}; give it a value from 0 to 1.")
     wavelengths: NDArray[np.float64] = np.asarray(CHANNEL_WAVELENGTHS, dtype=np.float64)
     x = SECOND_RADIATION_CONSTANT / (wavelengths * temperature)
     planck_ratio_log = _log_of_exp_minus_one(x) - _log_of_exp_minus_one(x * shift)
     shift_log = np.log(shift)
-    exponent = 4.0 * (colour_amount - brightness_amount) * shift_log + colour_amount * planck_ratio_log
+    exponent = 4.0 * (color_amount - brightness_amount) * shift_log + color_amount * planck_ratio_log
     gain: NDArray[np.float64] = np.asarray(np.exp(np.clip(exponent, -MOST, MOST)), dtype=np.float64)
     return gain

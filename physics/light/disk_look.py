@@ -2,8 +2,8 @@
 """What an artist decides about a disk, and the light and opacity that follow at each place of it.
 
 The light of a face is that of a black body of temperature T(r), seen as one of temperature g T and g^4 times as bright
-(Liouville, see `colour`), or g^3 for a narrow band of frequencies. How much of either is applied goes from 0, the
-artist's disk without motion, to 1, physics: temperature g^colour T, brightness g^(exponent brightness).
+(Liouville, see `color`), or g^3 for a narrow band of frequencies. How much of either is applied goes from 0, the
+artist's disk without motion, to 1, physics: temperature g^color T, brightness g^(exponent brightness).
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from ..shot.disk import Disk
 from .color import redshift_gain
 from .disk_flux import relative_flux
 from .disk_texture import PICTURE_CHANNELS, moving_texture
-from .star_color import black_body_colour
+from .star_color import black_body_color
 
 BOLOMETRIC, MONOCHROMATIC = 4, 3
 
-# Light that is redshifted further is not seen; alphas below this one have no colour.
+# Light that is redshifted further is not seen; alphas below this one have no color.
 SMALLEST_G, SMALLEST_ALPHA = 1e-6, 1e-6
 
 # What settings may be; amounts and shares are from 0 to 1.
 RANGES = {
-    **dict.fromkeys(("doppler_colour", "doppler_brightness", "colour_variation", "falloff"), (0.0, 1.0)),
+    **dict.fromkeys(("doppler_color", "doppler_brightness", "color_variation", "falloff"), (0.0, 1.0)),
     **dict.fromkeys(("opacity", "streaks", "clumps", "inner_softness", "outer_softness"), (0.0, 1.0)),
     "exponent": (0.0, 20.0),
     "exposure": (-32.0, 32.0),
     "gain": (1.0, 8.0),
 }
 
-# Temperatures between which colours are tabulated, kelvin, evenly in their logarithm.
-COLDEST, HOTTEST, COLOURS = 500.0, 60_000.0, 512
-_TABLE = np.linspace(np.log(COLDEST), np.log(HOTTEST), COLOURS)
-_COLOURS = black_body_colour(np.exp(_TABLE))
+# Temperatures between which colors are tabulated, kelvin, evenly in their logarithm.
+COLDEST, HOTTEST, COLORS = 500.0, 60_000.0, 512
+_TABLE = np.linspace(np.log(COLDEST), np.log(HOTTEST), COLORS)
+_COLORS = black_body_color(np.exp(_TABLE))
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class DiskLook:
     """Of the power law."""
     temperature: float = 6500.0
     """Where the disk is brightest, kelvin."""
-    doppler_colour: float = 1.0
+    doppler_color: float = 1.0
     """How much g changes the temperature that is seen."""
     doppler_brightness: float = 1.0
     """How much g changes the brightness."""
     beaming: int = BOLOMETRIC
     """The power of g in the brightness: 4, or 3 for a narrow band."""
-    colour_variation: float = 1.0
+    color_variation: float = 1.0
     """How far the temperature follows the profile, T ~ F^(1/4): at 0 the disk has one temperature."""
     falloff: float = 1.0
     """How far the brightness follows the profile: at 0 it is the same at all radii."""
@@ -105,9 +105,9 @@ PRESETS: dict[str, DiskLook] = {
         profile="power_law",
         exponent=1.5,
         temperature=4300.0,
-        doppler_colour=0.0,
+        doppler_color=0.0,
         doppler_brightness=0.0,
-        colour_variation=0.5,
+        color_variation=0.5,
         opacity=0.95,
         streaks=0.85,
         clumps=0.3,
@@ -119,7 +119,7 @@ PRESETS: dict[str, DiskLook] = {
     "physical": DiskLook(exposure=2.0),
     "blue hot": DiskLook(
         temperature=18_000.0,
-        doppler_colour=0.7,
+        doppler_color=0.7,
         doppler_brightness=0.5,
         streaks=0.8,
         clumps=0.5,
@@ -129,7 +129,7 @@ PRESETS: dict[str, DiskLook] = {
         profile="power_law",
         exponent=2.4,
         temperature=2400.0,
-        doppler_colour=0.3,
+        doppler_color=0.3,
         doppler_brightness=0.4,
         streaks=0.9,
         clumps=0.8,
@@ -141,36 +141,36 @@ PRESETS: dict[str, DiskLook] = {
 """Looks by name."""
 
 
-def seen_colour(temperature: Array) -> Array:
-    """Return a black body's colour, linear Rec. 709 of luminance 1, shape (..., 3), from a table."""
+def seen_color(temperature: Array) -> Array:
+    """Return a black body's color, linear Rec. 709 of luminance 1, shape (..., 3), from a table."""
     place = np.log(np.clip(temperature, COLDEST, HOTTEST))
-    return np.stack([np.interp(place, _TABLE, _COLOURS[:, i]) for i in range(3)], axis=-1)
+    return np.stack([np.interp(place, _TABLE, _COLORS[:, i]) for i in range(3)], axis=-1)
 
 
 def emission(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array) -> Array:
     """Return the light of an opaque disk where it is densest, linear Rec. 709, shape (..., 3)."""
     inner, _ = disk.radii(spin)
     flux = relative_flux(look.profile, spin, radius, inner, look.exponent, disk.retrograde)
-    # Matter that falls from the innermost stable orbit is dark by that flux; its colour is then of no matter.
-    temperature = look.temperature * np.maximum(flux, 1e-6) ** (0.25 * look.colour_variation)
-    colour = seen_colour(temperature * g**look.doppler_colour)
+    # Matter that falls from the innermost stable orbit is dark by that flux; its color is then of no matter.
+    temperature = look.temperature * np.maximum(flux, 1e-6) ** (0.25 * look.color_variation)
+    color = seen_color(temperature * g**look.doppler_color)
     brightness = flux**look.falloff * g ** (look.beaming * look.doppler_brightness) * 2.0**look.exposure
-    light: Array = colour * brightness[..., None]
+    light: Array = color * brightness[..., None]
     return light
 
 
-def tinted_light(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array, colour: Array) -> Array:
-    """Return the light of places that have colours of their own, shape (..., 3), where they are densest.
+def tinted_light(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array, color: Array) -> Array:
+    """Return the light of places that have colors of their own, shape (..., 3), where they are densest.
 
-    Brightness is that of `emission`; the colour is shifted as the sky's is (`colour.redshift_gain`), as light of the
+    Brightness is that of `emission`; the color is shifted as the sky's is (`color.redshift_gain`), as light of the
     look's temperature, whatever the radius.
     """
     inner, _ = disk.radii(spin)
     flux = relative_flux(look.profile, spin, radius, inner, look.exponent, disk.retrograde)
     brightness = flux**look.falloff * g ** (look.beaming * look.doppler_brightness) * 2.0**look.exposure
-    light: Array = colour * brightness[..., None]
-    if look.doppler_colour > 0.0:
-        light = light * redshift_gain(1.0 / np.maximum(g, SMALLEST_G), look.doppler_colour, 0.0, look.temperature)
+    light: Array = color * brightness[..., None]
+    if look.doppler_color > 0.0:
+        light = light * redshift_gain(1.0 / np.maximum(g, SMALLEST_G), look.doppler_color, 0.0, look.temperature)
     return light
 
 
@@ -213,7 +213,7 @@ def shade(
         thin ring, all of the disk at once: the less is covered, the more it shows the mean of streaks and clumps.
     texture : ndarray, shape (rows, columns, 2 or 4)
         Streaks and clumps, see `disk_texture.disk_texture`; or a picture, linear Rec. 709 premultiplied by its alpha,
-        whose colours are the disk's and whose alpha is its density.
+        whose colors are the disk's and whose alpha is its density.
     time : float
         Units of M.
     period : float, optional
@@ -224,8 +224,8 @@ def shade(
     noise = moving_texture(texture, radius, phi, time, spin, inner, outer, disk.retrograde, period)
     if texture.shape[2] == PICTURE_CHANNELS:
         thick = noise[..., 3]
-        colour = noise[..., :3] / np.maximum(thick, SMALLEST_ALPHA)[..., None]
-        light = tinted_light(look, disk, spin, radius, g, colour)
+        color = noise[..., :3] / np.maximum(thick, SMALLEST_ALPHA)[..., None]
+        light = tinted_light(look, disk, spin, radius, g, color)
         return light, look.opacity * np.clip(thick, 0.0, 1.0) * fade(look, disk, spin, radius)
     noise = 0.5 + coverage[..., None] * (noise - 0.5)
     thick = density(look, disk, spin, radius, noise)

@@ -147,7 +147,7 @@ def moving_texture(
 
     Notes
     -----
-    A picture of four channels is one of colours, premultiplied: its two patterns are mixed as they are.
+    A picture of four channels is one of colors, premultiplied: its two patterns are mixed as they are.
     """
     omega = orbital_frequency(spin, radius, retrograde)
     if period is None:

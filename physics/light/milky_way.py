@@ -8,14 +8,14 @@ along each line of sight; the Sun is in the plane. The numbers follow these work
 picture:
 
 * disc of stars: scale height 300 pc, scale length 2600 pc (Juric et al. 2008, ApJ 673, 864); luminosity of
-  the column through the disc at the Sun 24.4 solar luminosities per square parsec in V, colour from its
+  the column through the disc at the Sun 24.4 solar luminosities per square parsec in V, color from its
   mass-to-light ratios 1.4 in B and 1.5 in V (Flynn et al. 2006, MNRAS 372, 1149);
 * dust: extinction 0.7 mag/kpc in V at the Sun, scale height 140 pc, scale length 4500 pc (the diffuse
   extinction of the Besancon model, Robin et al. 2003, A&A 409, 523);
-* distance of the galactic centre 8 kpc (Reid 1993, ARA&A 31, 345); the Sun's absolute magnitude 4.81 in V
+* distance of the galactic center 8 kpc (Reid 1993, ARA&A 31, 345); the Sun's absolute magnitude 4.81 in V
   (Willmer 2018, ApJS 236, 47).
 
-The stars of the catalogue are drawn one by one, so their light must not be counted twice. They are, roughly,
+The stars of the catalog are drawn one by one, so their light must not be counted twice. They are, roughly,
 the nearest ones; so the glow starts at the distance within which the model emits just as much light, averaged
 over the sky, as the drawn stars have together.
 
@@ -38,10 +38,10 @@ STAR_COLUMN = 24.4  # solar luminosities / pc^2, V
 DUST_HEIGHT = 140.0  # pc
 DUST_LENGTH = 4500.0  # pc
 DUST_EXTINCTION = 0.7e-3  # mag / pc, V
-CENTRE_DISTANCE = 8000.0  # pc
+CENTER_DISTANCE = 8000.0  # pc
 SUN_ABSOLUTE_MAGNITUDE = 4.81  # V
-SUN_COLOUR_INDEX = 0.65  # B-V
-COLOUR_INDEX = SUN_COLOUR_INDEX - 2.5 * math.log10(1.5 / 1.4)
+SUN_COLOR_INDEX = 0.65  # B-V
+COLOR_INDEX = SUN_COLOR_INDEX - 2.5 * math.log10(1.5 / 1.4)
 """B-V of the disc's light: the luminosities in B and V go as the inverse of the mass-to-light ratios."""
 
 # From equatorial to galactic coordinates, J2000: the galactic pole, and the longitude of the celestial pole.
@@ -88,9 +88,9 @@ class Glow:
 
 
 def galactic_axes() -> Array:
-    """The axes of galactic coordinates in equatorial ones: rows towards the centre, l = 90 degrees, the pole.
+    """The axes of galactic coordinates in equatorial ones: rows towards the center, l = 90 degrees, the pole.
 
-    Source: the IAU's definition of 1958, transferred to J2000 (Hipparcos catalogue, volume 1, section 1.5.3).
+    Source: the IAU's definition of 1958, transferred to J2000 (Hipparcos catalog, volume 1, section 1.5.3).
     """
     sin_dec, cos_dec = math.sin(_POLE_DEC), math.cos(_POLE_DEC)
     sin_ra, cos_ra = math.sin(_POLE_RA), math.cos(_POLE_RA)
@@ -108,8 +108,8 @@ def _accumulated_light() -> Array:
     longitude = _LONGITUDES[np.newaxis, :, np.newaxis]
     in_plane = _DISTANCES * np.cos(latitude)
     height = _DISTANCES * np.sin(latitude)
-    radius = np.sqrt(CENTRE_DISTANCE**2 + in_plane**2 - 2.0 * CENTRE_DISTANCE * in_plane * np.cos(longitude))
-    outward = radius - CENTRE_DISTANCE
+    radius = np.sqrt(CENTER_DISTANCE**2 + in_plane**2 - 2.0 * CENTER_DISTANCE * in_plane * np.cos(longitude))
+    outward = radius - CENTER_DISTANCE
     emission = STAR_COLUMN / (2.0 * STAR_HEIGHT) * np.exp(-height / STAR_HEIGHT - outward / STAR_LENGTH)
     extinction = DUST_EXTINCTION * np.exp(-height / DUST_HEIGHT - outward / DUST_LENGTH)
     magnitudes = _accumulate(extinction)

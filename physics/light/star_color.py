@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of stars: from the colour index B-V to a temperature, and from there to linear Rec. 709."""
+"""Colors of stars: from the color index B-V to a temperature, and from there to linear Rec. 709."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .color import SECOND_RADIATION_CONSTANT
 
 Array = NDArray[np.float64]
 
-UNKNOWN_COLOUR_INDEX = 0.45
+UNKNOWN_COLOR_INDEX = 0.45
 """B-V taken where none was measured: a white star of about 6600 K."""
 
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
@@ -28,16 +28,16 @@ _XYZ_TO_REC709 = np.array(
 _WAVELENGTHS = np.arange(380.0, 781.0, 5.0)  # nm
 
 
-def _lobe(peak: float, centre: float, width_below: float, width_above: float) -> Array:
-    """One lobe of the colour-matching fits: a Gaussian in wavelength with two inverse widths (1 / nm)."""
-    offset = _WAVELENGTHS - centre
+def _lobe(peak: float, center: float, width_below: float, width_above: float) -> Array:
+    """One lobe of the color-matching fits: a Gaussian in wavelength with two inverse widths (1 / nm)."""
+    offset = _WAVELENGTHS - center
     scaled: Array = offset * np.where(offset < 0.0, width_below, width_above)
     result: Array = peak * np.exp(-0.5 * scaled**2)
     return result
 
 
 def _matching_functions() -> Array:
-    """CIE 1931 colour-matching functions at `_WAVELENGTHS`, shape (n, 3).
+    """CIE 1931 color-matching functions at `_WAVELENGTHS`, shape (n, 3).
 
     Source: the multi-lobe fits of Wyman, Sloan & Shirley 2013, "Simple Analytic Approximations to the CIE XYZ
     Color Matching Functions", Journal of Computer Graphics Techniques 2 (2), 1, Listing 1.
@@ -48,13 +48,13 @@ def _matching_functions() -> Array:
     return np.stack([x, y, z], axis=-1)
 
 
-def temperature_from_colour_index(b_v: ArrayLike) -> Array:
-    """Effective temperature of a star from its colour index.
+def temperature_from_color_index(b_v: ArrayLike) -> Array:
+    """Effective temperature of a star from its color index.
 
     Parameters
     ----------
     b_v : array_like, shape (...)
-        Colour index B-V in magnitudes, above -0.6; NaN (unknown) counts as `UNKNOWN_COLOUR_INDEX`.
+        Color index B-V in magnitudes, above -0.6; NaN (unknown) counts as `UNKNOWN_COLOR_INDEX`.
 
     Returns
     -------
@@ -66,12 +66,12 @@ def temperature_from_colour_index(b_v: ArrayLike) -> Array:
     Source: Ballesteros 2012, "New insights into black bodies", EPL 97, 34008, Eq. 14.
     """
     index: Array = np.asarray(b_v, dtype=np.float64)
-    index = np.where(np.isnan(index), UNKNOWN_COLOUR_INDEX, index)
+    index = np.where(np.isnan(index), UNKNOWN_COLOR_INDEX, index)
     return 4600.0 * (1.0 / (0.92 * index + 1.7) + 1.0 / (0.92 * index + 0.62))
 
 
-def black_body_colour(temperature: ArrayLike) -> Array:
-    """Colour of a black body in linear Rec. 709 (D65 white), scaled to luminance 1.
+def black_body_color(temperature: ArrayLike) -> Array:
+    """Color of a black body in linear Rec. 709 (D65 white), scaled to luminance 1.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def black_body_colour(temperature: ArrayLike) -> Array:
 
     Notes
     -----
-    Planck's law, summed with the CIE 1931 colour-matching functions from 380 to 780 nm.
+    Planck's law, summed with the CIE 1931 color-matching functions from 380 to 780 nm.
     """
     kelvin: Array = np.asarray(temperature, dtype=np.float64)[..., np.newaxis]
     # Relative to the radiance at 555 nm, so that nothing underflows at low temperatures.
@@ -94,5 +94,5 @@ def black_body_colour(temperature: ArrayLike) -> Array:
     log_radiance = -5.0 * np.log(_WAVELENGTHS / 555.0) + (x_reference - x)
     radiance = np.exp(log_radiance) * np.expm1(-x_reference) / np.expm1(-x)
     rgb = np.maximum(radiance @ _matching_functions() @ _XYZ_TO_REC709.T, 0.0)
-    colour: Array = rgb / (rgb @ LUMINANCE_WEIGHTS)[..., np.newaxis]
-    return colour
+    color: Array = rgb / (rgb @ LUMINANCE_WEIGHTS)[..., np.newaxis]
+    return color

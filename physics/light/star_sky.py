@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.errors import BlackHoleError
-from .milky_way import COLOUR_INDEX, unresolved_glow
-from .star_color import black_body_colour, temperature_from_colour_index
+from .milky_way import COLOR_INDEX, unresolved_glow
+from .star_color import black_body_color, temperature_from_color_index
 
 Array = NDArray[np.float64]
 
-CATALOGUE = Path(__file__).parent / "data" / "stars_xhip.npz"
+CATALOG = Path(__file__).parent / "data" / "stars_xhip.npz"
 FAINTEST = 8.0
-"""The magnitude that the catalogue reaches."""
+"""The magnitude that the catalog reaches."""
 
 ZERO_MAGNITUDE = 1.2e-4
 """Light of a star of magnitude 0 in the picture, in radiance times steradian.
@@ -38,12 +38,12 @@ _ROWS_AT_ONCE = 64
 
 @dataclass(frozen=True)
 class Stars:
-    """A catalogue of stars; arrays of shape (n,)."""
+    """A catalog of stars; arrays of shape (n,)."""
 
     right_ascension: Array  # radians, J2000
     declination: Array  # radians, J2000
     magnitude: Array  # V
-    colour_index: Array  # B-V, NaN where unknown
+    color_index: Array  # B-V, NaN where unknown
 
     @property
     def flux(self) -> Array:
@@ -58,7 +58,7 @@ def load_stars(magnitude_limit: float = FAINTEST) -> Stars:
     Parameters
     ----------
     magnitude_limit : float
-        The faintest visual magnitude wanted; the catalogue ends at 8.0.
+        The faintest visual magnitude wanted; the catalog ends at 8.0.
 
     Returns
     -------
@@ -72,19 +72,19 @@ def load_stars(magnitude_limit: float = FAINTEST) -> Stars:
     """
     if math.isnan(magnitude_limit):
         raise BlackHoleError("The magnitude limit is not a number; give one between -1 and 8.")
-    with np.load(CATALOGUE) as file:
+    with np.load(CATALOG) as file:
         columns = {name: file[name].astype(np.float64) for name in ("ra_deg", "dec_deg", "v_mag", "b_v")}
     bright = columns["v_mag"] <= magnitude_limit
     return Stars(
         right_ascension=np.radians(columns["ra_deg"][bright]),
         declination=np.radians(columns["dec_deg"][bright]),
         magnitude=columns["v_mag"][bright],
-        colour_index=columns["b_v"][bright],
+        color_index=columns["b_v"][bright],
     )
 
 
 def texel_directions(rows: NDArray[np.intp], height: int) -> Array:
-    """Unit vectors of the centres of a panorama's texels.
+    """Unit vectors of the centers of a panorama's texels.
 
     Parameters
     ----------
@@ -140,8 +140,8 @@ def draw_stars(stars: Stars, height: int, star_width: float = 0.6) -> Array:
     texel = math.pi / height
     sigma = star_width * texel
     solid_angles = row_solid_angles(height)
-    colours = black_body_colour(temperature_from_colour_index(stars.colour_index)) * stars.flux[:, np.newaxis]
-    # Continuous position in the panorama, texel centres at i + 0.5.
+    colors = black_body_color(temperature_from_color_index(stars.color_index)) * stars.flux[:, np.newaxis]
+    # Continuous position in the panorama, texel centers at i + 0.5.
     row = (0.5 - stars.declination / math.pi) * height
     column = (0.5 - stars.right_ascension / (2.0 * math.pi)) * width
     row_reach = math.ceil(_REACH * star_width) + 1
@@ -174,7 +174,7 @@ def draw_stars(stars: Stars, height: int, star_width: float = 0.6) -> Array:
             weight /= light
             texels = (r * width + c).ravel()
             for channel in range(3):
-                values = weight * colours[chosen, channel][:, np.newaxis, np.newaxis]
+                values = weight * colors[chosen, channel][:, np.newaxis, np.newaxis]
                 # Not `picture[texels] += ...`: one texel may belong to several stars.
                 np.add.at(picture[:, channel], texels, values.ravel())
     return picture.reshape(height, width, 3)
@@ -207,7 +207,7 @@ def star_sky(
     height : int
         Height in texels, at least 16; the width is twice that.
     magnitude_limit : float
-        The faintest visual magnitude drawn as a star of its own; the catalogue ends at 8.0.
+        The faintest visual magnitude drawn as a star of its own; the catalog ends at 8.0.
     galactic_glow : bool
         Whether to add the light of the stars that are not drawn, see `physics.milky_way`.
     star_width : float
@@ -234,7 +234,7 @@ def star_sky(
     picture = draw_stars(stars, height, star_width)
     if galactic_glow:
         glow = unresolved_glow(float(np.sum(stars.flux)))
-        tint = black_body_colour(temperature_from_colour_index(COLOUR_INDEX))
+        tint = black_body_color(temperature_from_color_index(COLOR_INDEX))
         for start in range(0, height, _ROWS_AT_ONCE):
             rows = np.arange(start, min(start + _ROWS_AT_ONCE, height))
             picture[rows] += glow(texel_directions(rows, height))[..., np.newaxis] * tint

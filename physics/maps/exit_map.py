@@ -22,7 +22,7 @@ from .painting import GROUP_PIXELS, Painting
 # sphere of this radius by the same angle, or by less.
 IMPACT_SCALE = DEFAULT_SPHERE_RADIUS
 
-# Error of direction allowed to bilinear interpolation between pixel centres, radians: a tenth of a pixel of common
+# Error of direction allowed to bilinear interpolation between pixel centers, radians: a tenth of a pixel of common
 # pictures. Where it would be more, a pixel is marked as not usable, and the camera follows the ray itself.
 BILINEAR_TOLERANCE = 5e-5
 
@@ -40,13 +40,13 @@ class ExitMap:
     one_plus_z: Image
     """f_source / f_camera for a source at rest at infinity; 1 where there is none."""
     usable: Image
-    """1 where N and D may be interpolated between this pixel's centre and those around it, else 0."""
+    """1 where N and D may be interpolated between this pixel's center and those around it, else 0."""
     metadata: dict[str, Any]
     """What the file's header says: ``format``, ``hash``, ``counts`` and ``parameters``."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """Pixels by what their centres see: ``sky``, ``shadow``, ``unresolved``; ``usable`` ones; ``rays`` traced."""
+        """Pixels by what their centers see: ``sky``, ``shadow``, ``unresolved``; ``usable`` ones; ``rays`` traced."""
         counts: dict[str, int] = self.metadata["counts"]
         return counts
 
@@ -134,7 +134,7 @@ class ExitPainting(Painting):
         tiles.put(self._one_plus_z, one_plus_z)
 
     def _trace(self, tiles: Tiles, done: float, end: float) -> Generator[float, None, None]:
-        """Fill tiles by a ray for each pixel's centre, yielding fractions from `done` to `end`."""
+        """Fill tiles by a ray for each pixel's center, yielding fractions from `done` to `end`."""
         group = max(1, GROUP_PIXELS // (tiles.side * tiles.side))
         for start in range(0, len(tiles), group):
             part = tiles.select(np.arange(start, min(start + group, len(tiles))))
@@ -157,8 +157,8 @@ class ExitPainting(Painting):
 def interpolable(lines: NDArray[np.floating[Any]], tolerance: float) -> NDArray[np.bool_]:
     """Return where values may be interpolated bilinearly to within `tolerance`, shape (height, width).
 
-    Between the four centres of a cell the error is up to (|f_xx| + |f_yy|) / 8 in units of pixels; second differences
-    stand for the derivatives, those of the neighbours at the picture's sides. False where they are not finite.
+    Between the four centers of a cell the error is up to (|f_xx| + |f_yy|) / 8 in units of pixels; second differences
+    stand for the derivatives, those of the neighbors at the picture's sides. False where they are not finite.
     """
     height, width = lines.shape[:2]
     bend, lines = np.zeros((height, width)), lines.astype(np.float64)

@@ -15,7 +15,7 @@ from ..kerr.rays import Array
 from ..numerics.sphere import celestial_coordinates
 from ..sampling.tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, sides_for, tiles_of
 from ..sampling.view import View
-from ..sampling.visibility import CENTRE_REACH, cells_for_shadow, centre_block, near_edge, refine
+from ..sampling.visibility import CENTER_REACH, cells_for_shadow, center_block, near_edge, refine
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters
 from .sky_table import SkyTable
@@ -118,8 +118,8 @@ class Painting:
         touched = np.zeros((rows, columns), dtype=bool)
         for corner in (corner_sky[:-1, 1:], corner_sky[1:, :-1], corner_sky[1:, 1:]):
             touched |= corner != corner_sky[:-1, :-1]
-        for x, y in (self._outline_points(), self._centre_points()):
-            # One pixel to each side: a pixel counts as touched when a neighbour is.
+        for x, y in (self._outline_points(), self._center_points()):
+            # One pixel to each side: a pixel counts as touched when a neighbor is.
             for shift_x in (-2.0, 2.0):
                 for shift_y in (-2.0, 2.0):
                     column, row = (x + shift_x) // side, (y + shift_y) // side
@@ -149,13 +149,13 @@ class Painting:
         seen = np.isfinite(points_x)
         return points_x[seen], points_y[seen]
 
-    def _centre_points(self) -> tuple[Array, Array]:
-        """Return points that mark the pixels around the hole's centre, which `refine` looks at in any case."""
-        centre = self._view.centre()
-        if centre is None:
+    def _center_points(self) -> tuple[Array, Array]:
+        """Return points that mark the pixels around the hole's center, which `refine` looks at in any case."""
+        center = self._view.center()
+        if center is None:
             return np.empty(0), np.empty(0)
-        reach = np.arange(-CENTRE_REACH, CENTRE_REACH + 1.0)
-        x, y = np.meshgrid(centre[0] + reach, centre[1] + reach)
+        reach = np.arange(-CENTER_REACH, CENTER_REACH + 1.0)
+        x, y = np.meshgrid(center[0] + reach, center[1] + reach)
         return x.ravel(), y.ravel()
 
     def _directions(self, x: Array, y: Array) -> Array:
@@ -236,7 +236,7 @@ class Painting:
     def _visible_parts(self, tiles: Tiles) -> tuple[Array, Array, Array]:
         """Return the visible share of each pixel and a point in the visible part, shape (n, side, side) each."""
         columns, rows = tiles.pixels()
-        # A pixel more on each side: whether a pixel is near the edge depends on its neighbours.
+        # A pixel more on each side: whether a pixel is near the edge depends on its neighbors.
         steps = np.arange(-1, tiles.side + 2)
         corner_x = tiles.column[:, None, None] + steps + 0.0 * steps[:, None]
         corner_y = tiles.row[:, None, None] + steps[:, None] + 0.0 * steps
@@ -249,15 +249,15 @@ class Painting:
         visibility[where], x[where], y[where] = refine(
             tiles.column[tile] + column, tiles.row[tile] + row, self._view.edge
         )
-        centre = self._view.centre()
-        block_column, block_row = centre_block(centre, self._width, self._height)
+        center = self._view.center()
+        block_column, block_row = center_block(center, self._width, self._height)
         for i in range(len(tiles)):
             column, row = block_column - tiles.column[i], block_row - tiles.row[i]
             held = (column >= 0) & (column < tiles.side) & (row >= 0) & (row < tiles.side)
-            if centre is not None and held.any():
+            if center is not None and held.any():
                 place = (i, row[held], column[held])
                 visibility[place], x[place], y[place] = refine(
-                    block_column[held], block_row[held], self._view.edge, cells_for_shadow(centre, self._view.edge)
+                    block_column[held], block_row[held], self._view.edge, cells_for_shadow(center, self._view.edge)
                 )
         return visibility, x, y
 

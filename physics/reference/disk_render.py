@@ -64,9 +64,9 @@ def disk_layers(
         radius, phi, g, coverage = (
             plane[seen].astype(np.float64) for plane in (one.radius, one.phi, one.g, one.coverage)
         )
-        colour, opacity = shade(look, disk, spin, (radius, phi, g, coverage), texture, time, period)
+        color, opacity = shade(look, disk, spin, (radius, phi, g, coverage), texture, time, period)
         alpha = opacity * coverage
-        light[seen] += (through[seen] * alpha)[:, None] * colour
+        light[seen] += (through[seen] * alpha)[:, None] * color
         through[seen] *= 1.0 - alpha
     return light, through
 

@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MAGENTA = (1.0, 0.0, 1.0)
-"""Colour of pixels that no valid warp map can hold."""
+"""Color of pixels that no valid warp map can hold."""
 
 SMALLEST_ONE_PLUS_Z = 1e-6
 LARGEST_ONE_PLUS_Z = 1e6
@@ -108,7 +108,7 @@ def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatAr
     Parameters
     ----------
     environment : array_like, shape (rows, columns, channels)
-        Row 0 at the top (the zenith, +z), the middle column towards +x. Texel centres at (i + 0.5) / N.
+        Row 0 at the top (the zenith, +z), the middle column towards +x. Texel centers at (i + 0.5) / N.
     directions : array_like, shape (..., 3)
         Directions to look along; they need not be of unit length.
 
@@ -135,8 +135,8 @@ def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatAr
     bottom_index = np.clip(top.astype(np.int64) + 1, 0, rows - 1)
     upper = picture[top_index, left_index] * (1.0 - share_x) + picture[top_index, right_index] * share_x
     lower = picture[bottom_index, left_index] * (1.0 - share_x) + picture[bottom_index, right_index] * share_x
-    colours: FloatArray = upper * (1.0 - share_y) + lower * share_y
-    return colours
+    colors: FloatArray = upper * (1.0 - share_y) + lower * share_y
+    return colors
 
 
 def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:
@@ -181,7 +181,7 @@ def render(
     environment: ArrayLike,
     *,
     rotation: ArrayLike = (0.0, 0.0, 0.0),
-    colour_amount: float = 1.0,
+    color_amount: float = 1.0,
     brightness_amount: float = 1.0,
     temperature: float = DEFAULT_TEMPERATURE,
     exposure: float = 0.0,
@@ -199,8 +199,8 @@ def render(
         Equirectangular picture of the sky in scene-linear values, row 0 at the top. Alpha is ignored.
     rotation : array_like, shape (3,)
         XYZ Euler angles (radians) of the environment, as in a Mapping node (type Point) of a World's nodes.
-    colour_amount, brightness_amount : float
-        0 (off) to 1 (physical); see `colour.redshift_gain`.
+    color_amount, brightness_amount : float
+        0 (off) to 1 (physical); see `color.redshift_gain`.
     temperature : float
         Assumed black-body temperature of the sky in kelvin, > 0.
     exposure : float
@@ -246,13 +246,13 @@ def render(
     shift = np.where(invalid, 1.0, one_plus_z)
     seen = np.where(invalid, 1.0, visibility)
     directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
-    colours = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
-    colours *= redshift_gain(shift, colour_amount, brightness_amount, temperature)
-    colours *= (2.0**exposure * strength * seen)[..., np.newaxis]
-    colours[invalid] = MAGENTA
+    colors = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
+    colors *= redshift_gain(shift, color_amount, brightness_amount, temperature)
+    colors *= (2.0**exposure * strength * seen)[..., np.newaxis]
+    colors[invalid] = MAGENTA
 
     data = np.stack([seen, shift, invalid.astype(np.float64)], axis=-1)
-    sky = resize(colours, output_size)
+    sky = resize(colors, output_size)
     seen, shift, broken = np.moveaxis(resize(data, output_size), -1, 0)
     image = sky if front is None else front[..., :3] + (1.0 - front[..., 3:]) * sky
     # A broken map must not hide behind an opaque foreground.
@@ -277,7 +277,7 @@ def _within(values: FloatArray, low: float, high: float) -> BoolArray:
 
 
 def _bilinear_resize(picture: FloatArray, width: int, height: int) -> FloatArray:
-    """Bilinear samples at the new pixels' centres, edges extended; half the size averages 2 x 2 pixels."""
+    """Bilinear samples at the new pixels' centers, edges extended; half the size averages 2 x 2 pixels."""
     rows, row_share = _interpolation(picture.shape[0], height)
     columns, column_share = _interpolation(picture.shape[1], width)
     below = np.minimum(rows + 1, picture.shape[0] - 1)
@@ -289,12 +289,12 @@ def _bilinear_resize(picture: FloatArray, width: int, height: int) -> FloatArray
 
 
 def _interpolation(old_count: int, new_count: int) -> tuple[NDArray[np.int64], FloatArray]:
-    """For each new pixel, the old pixel before its centre and the next one's weight."""
-    centres = (np.arange(new_count) + 0.5) * old_count / new_count - 0.5
-    centres = np.clip(centres, 0.0, old_count - 1.0)
-    before = np.floor(centres).astype(np.int64)
-    return before, centres - before
+    """For each new pixel, the old pixel before its center and the next one's weight."""
+    centers = (np.arange(new_count) + 0.5) * old_count / new_count - 0.5
+    centers = np.clip(centers, 0.0, old_count - 1.0)
+    before = np.floor(centers).astype(np.int64)
+    return before, centers - before
 
 
-def _opaque(colours: FloatArray) -> FloatArray:
-    return np.concatenate([colours, np.ones_like(colours[..., :1])], axis=-1)
+def _opaque(colors: FloatArray) -> FloatArray:
+    return np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1)

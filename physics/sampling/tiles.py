@@ -105,7 +105,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def _at_pixels(side: int, count: int) -> Array:
-    """The Chebyshev polynomials at the pixel centres of a tile, shape (side, count)."""
+    """The Chebyshev polynomials at the pixel centers of a tile, shape (side, count)."""
     place = 2.0 * (np.arange(side) + 0.5) / side - 1.0
     polynomials: Array = np.cos(np.arange(count) * np.arccos(place)[:, None])
     return polynomials
@@ -134,7 +134,7 @@ def coefficients_of(values: Array) -> Array:
 
 
 def at_pixels(side: int, count: int = POINTS) -> tuple[Array, Array]:
-    """Return the Chebyshev polynomials and their slopes per pixel at a tile's pixel centres, shape (side, count)."""
+    """Return the Chebyshev polynomials and their slopes per pixel at a tile's pixel centers, shape (side, count)."""
     angle = np.arccos(2.0 * (np.arange(side) + 0.5) / side - 1.0)[:, None]
     order = np.arange(count)
     # T_n' = n sin(n t) / sin(t), x = cos(t)

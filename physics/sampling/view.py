@@ -110,7 +110,7 @@ class View:
         looking = (places - r * triad[0]) @ triad.T
         return self._pixels(looking / np.linalg.norm(looking, axis=-1, keepdims=True))
 
-    def centre(self) -> tuple[float, float] | None:
+    def center(self) -> tuple[float, float] | None:
         """Return the map pixel coordinates where the camera sees light that comes from the hole's direction."""
         x, y = self._pixels(np.array([[-1.0, 0.0, 0.0]]))
         return None if np.isnan(x[0]) else (float(x[0]), float(y[0]))

@@ -2,7 +2,7 @@
 """How much of each pixel sees the sky: the shadow's edge, anti-aliased from its closed form.
 
 `trapped.edge_function` is a smooth signed function of the ray that vanishes on the edge. Pixels whose corners all
-have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's centre (a distant hole
+have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's center (a distant hole
 is smaller than a pixel), are divided into cells, and the edge is followed from cell to cell as a chain of chords.
 """
 
@@ -24,8 +24,8 @@ CELLS = 4
 CELLS_PER_RADIUS = 4
 SMALLEST_SHADOW = 1.0 / 64.0
 
-# Pixels refined on each side of the one that looks at the hole's centre.
-CENTRE_REACH = 3
+# Pixels refined on each side of the one that looks at the hole's center.
+CENTER_REACH = 3
 
 # A pixel whose visible part is less than this, or lacks less, counts as shadow or sky: it holds no part that a
 # ray could be traced through.
@@ -84,25 +84,25 @@ def _may_bulge(values: Array) -> NDArray[np.bool_]:
     return bulges
 
 
-def centre_block(
-    centre: tuple[float, float] | None, width: int, height: int
+def center_block(
+    center: tuple[float, float] | None, width: int, height: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the columns and rows of the pixels around the one that sees the hole's centre, those in the picture."""
-    if centre is None or not (abs(centre[0]) < 1e9 and abs(centre[1]) < 1e9):
+    """Return the columns and rows of the pixels around the one that sees the hole's center, those in the picture."""
+    if center is None or not (abs(center[0]) < 1e9 and abs(center[1]) < 1e9):
         return np.empty(0, np.intp), np.empty(0, np.intp)
-    column, row = int(np.floor(centre[0])), int(np.floor(centre[1]))
-    columns = np.arange(max(column - CENTRE_REACH, 0), min(column + CENTRE_REACH + 1, width))
-    rows = np.arange(max(row - CENTRE_REACH, 0), min(row + CENTRE_REACH + 1, height))
+    column, row = int(np.floor(center[0])), int(np.floor(center[1]))
+    columns = np.arange(max(column - CENTER_REACH, 0), min(column + CENTER_REACH + 1, width))
+    rows = np.arange(max(row - CENTER_REACH, 0), min(row + CENTER_REACH + 1, height))
     grid_column, grid_row = np.meshgrid(columns, rows)
     return grid_column.ravel(), grid_row.ravel()
 
 
-def cells_for_shadow(centre: tuple[float, float], edge: EdgeFunction) -> int:
-    """Return how many cells along its side a pixel at the hole's centre needs for a shadow of this size."""
+def cells_for_shadow(center: tuple[float, float], edge: EdgeFunction) -> int:
+    """Return how many cells along its side a pixel at the hole's center needs for a shadow of this size."""
     angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     radius = 1.0
     while radius > SMALLEST_SHADOW:
-        if (edge(centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)) < 0.0).any():
+        if (edge(center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)) < 0.0).any():
             break
         radius *= 0.5
     return max(CELLS, int(CELLS_PER_RADIUS / radius))
@@ -126,7 +126,7 @@ def refine(
     share : ndarray, shape (n,)
         0 to 1; exactly 0 or 1 for less than `SMALLEST_SHARE` of the other.
     x, y : ndarray, shape (n,)
-        The centroid of the visible part in pixel coordinates; the centre of a pixel that is wholly one thing.
+        The centroid of the visible part in pixel coordinates; the center of a pixel that is wholly one thing.
     """
     count = len(column)
     if not count:

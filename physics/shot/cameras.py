@@ -2,7 +2,7 @@
 """Blender's cameras: from a pixel of the picture to a direction in the camera's own axes.
 
 The axes are Blender's: x to the right, y up, looking along -z. Pixel coordinates count from the picture's top
-left corner; the centre of pixel (column i, row j) is (i + 0.5, j + 0.5).
+left corner; the center of pixel (column i, row j) is (i + 0.5, j + 0.5).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..numerics.sphere import by_component, cos_sin
 # Pictures beyond this are a mistake; refusing them beats running out of memory.
 LARGEST_SIDE = 65536
 
-# Lengths of lenses and sensors, millimetres, ratios of pixels, and shifts beyond which arithmetic would not hold.
+# Lengths of lenses and sensors, millimeters, ratios of pixels, and shifts beyond which arithmetic would not hold.
 SHORTEST, LONGEST = 1e-6, 1e6
 
 SENSOR_FITS = ("AUTO", "HORIZONTAL", "VERTICAL")
@@ -44,7 +44,7 @@ class PerspectiveCamera:
     width, height : int
         Size of the picture in pixels.
     focal_length, sensor_width, sensor_height : float
-        In millimetres, > 0.
+        In millimeters, > 0.
     sensor_fit : {"AUTO", "HORIZONTAL", "VERTICAL"}
         Which side of the picture the sensor fits; AUTO takes the longer one, and the sensor's width for both.
     shift_x, shift_y : float

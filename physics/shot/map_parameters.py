@@ -64,7 +64,7 @@ class WarpMapParameters:
     tolerance, method
         As for `trace_rays`.
     interpolation : float
-        Error of direction allowed where neighbouring rays are interpolated, radians; 0 traces every pixel.
+        Error of direction allowed where neighboring rays are interpolated, radians; 0 traces every pixel.
     disk : Disk or None
         A disk whose passes are baked along with the map.
     """
@@ -131,7 +131,7 @@ class WarpMapParameters:
 
     @property
     def pixel_angle(self) -> float:
-        """Angle between two neighbouring pixels of the map in the middle of the picture, radians."""
+        """Angle between two neighboring pixels of the map in the middle of the picture, radians."""
         x = 0.5 * self.camera.width + np.array([0.0, 1.0 / self.supersampling])
         one, other = self.camera.directions(x, np.full(2, 0.5 * self.camera.height))
         return float(np.linalg.norm(other - one))

@@ -53,12 +53,12 @@ def smooth_environment(width: int, height: int) -> FloatArray:
         (0.5 - (np.arange(width) + 0.5) / width) * 2.0 * np.pi, (np.arange(height) + 0.5) / height * np.pi
     )
     x, y, z = np.sin(polar) * np.cos(longitude), np.sin(polar) * np.sin(longitude), np.cos(polar)
-    colours = [0.5 + 0.4 * x, 0.5 + 0.3 * y * z, 0.6 + 0.3 * z * x, np.ones_like(x)]
-    return np.stack(colours, axis=-1).astype(np.float32)
+    colors = [0.5 + 0.4 * x, 0.5 + 0.3 * y * z, 0.6 + 0.3 * z * x, np.ones_like(x)]
+    return np.stack(colors, axis=-1).astype(np.float32)
 
 
 def noise_environment(width: int, height: int, brightest: float = 1.0) -> FloatArray:
-    """A sky with the largest possible difference between neighbouring texels."""
+    """A sky with the largest possible difference between neighboring texels."""
     return (np.random.default_rng(7).random((height, width, 4)) * brightest).astype(np.float32)
 
 

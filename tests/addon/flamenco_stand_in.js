@@ -23,7 +23,7 @@ function frames(range) {
     return [...found].sort((a, b) => a - b);
 }
 
-// As in "3-8,13,15-17"; two neighbours are written as 15,16.
+// As in "3-8,13,15-17"; two neighbors are written as 15,16.
 function merged(list) {
     const runs = [];
     for (const frame of list) {

@@ -28,7 +28,7 @@ def add_lens(scene: bpy.types.Scene, mass_scale: float = 0.2, **settings: object
     for name, value in settings.items():
         setattr(hole.umbra, name, value)
     scene.umbra.active_hole = hole
-    scene.umbra.redshift_colour = scene.umbra.redshift_brightness = 0.0
+    scene.umbra.redshift_color = scene.umbra.redshift_brightness = 0.0
     assert bpy.ops.umbra.set_output(output="CYCLES_LENS") == {"FINISHED"}
     return hole
 
@@ -36,7 +36,7 @@ def add_lens(scene: bpy.types.Scene, mass_scale: float = 0.2, **settings: object
 def add_ball(
     place: tuple[float, ...],
     radius: float,
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0),
     socket: str = "Surface",
 ) -> bpy.types.Object:
     """A ball that shines, at its surface or throughout its volume."""
@@ -47,7 +47,7 @@ def add_ball(
     made.node_tree.nodes.clear()
     light = made.node_tree.nodes.new("ShaderNodeEmission")
     output = made.node_tree.nodes.new("ShaderNodeOutputMaterial")
-    light.inputs["Color"].default_value = (*colour, 1.0)
+    light.inputs["Color"].default_value = (*color, 1.0)
     made.node_tree.links.new(light.outputs[0], output.inputs[socket])
     ball.data.materials.append(made)
     return ball

@@ -178,14 +178,14 @@ def test_an_output_that_does_not_use_the_render_is_left_alone(
 ) -> None:
     tree = compositor(scene)
     tree.nodes.remove(nodes_of(tree, "R_LAYERS")[0])
-    colour = tree.nodes.new("CompositorNodeRGB")
+    color = tree.nodes.new("CompositorNodeRGB")
     output = output_of(tree)
-    tree.links.new(colour.outputs[0], output.inputs[0])
+    tree.links.new(color.outputs[0], output.inputs[0])
     before, names = links_of(tree), {node.name for node in tree.nodes}
     use_sky(scene)
     notes = addon_module("outputs.compositor.compositing").set_up(scene)
     assert any("does not use the render" in note for note in notes)
-    assert origin(output.inputs[0])[0] == colour
+    assert origin(output.inputs[0])[0] == color
     assert not tree_module.is_in_use(scene)
     addon_module("outputs.compositor.compositing").remove(scene)
     assert links_of(tree) == before
@@ -254,7 +254,7 @@ def test_worlds_that_cannot_be_taken_over_say_why(
         with pytest.raises(scene_error, match=pattern):
             environment.read_world(scene)
 
-    refused("plain colour and has no environment")
+    refused("plain color and has no environment")
     nodes = world_sky(scene, environment_image())
     environment.read_world(scene)
     links = scene.world.node_tree.links
@@ -304,10 +304,10 @@ def test_a_sky_of_the_artists_own_nodes_stays(
 ) -> None:
     add_hole(scene)
     setup = tree_module.find_setup(scene)
-    colour = setup.tree.nodes.new("CompositorNodeRGB")
-    setup.tree.links.new(colour.outputs[0], setup.group.inputs["Environment"])
+    color = setup.tree.nodes.new("CompositorNodeRGB")
+    setup.tree.links.new(color.outputs[0], setup.group.inputs["Environment"])
     bpy.ops.umbra.setup_compositor()
-    assert origin(setup.group.inputs["Environment"])[0] == colour
+    assert origin(setup.group.inputs["Environment"])[0] == color
     scene.umbra.environment_image = None
     addon_module("outputs.compositor.compositor_sync").sync_sky(scene)  # nothing is missing
     assert addon_module("ui.status").sky_problem(scene) is None

@@ -3,7 +3,7 @@
 
 The group works in float32, and takes the flux from a table; LIGHT is the share of the disk's light by which it may
 differ. Streaks are the steepest part: a texture coordinate is off by 1e-6 of a turn, which is 1/500 texel, of which
-neighbours differ by up to a tenth.
+neighbors differ by up to a tenth.
 """
 
 import math
@@ -115,7 +115,7 @@ def test_every_preset_is_what_numpy_makes(
     assert_same(picture, expected, light)
 
 
-def test_one_colour_inside_the_innermost_orbit_with_two_images(
+def test_one_color_inside_the_innermost_orbit_with_two_images(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType
 ) -> None:
     hole_with_disk(
@@ -126,7 +126,7 @@ def test_one_colour_inside_the_innermost_orbit_with_two_images(
         inner_radius=1.8,
         outer_radius=9.0,
         beaming="MONOCHROMATIC",
-        doppler_colour=0.3,
+        doppler_color=0.3,
         doppler_brightness=0.6,
         crossings=2,
     )
@@ -215,7 +215,7 @@ KEYFRAMES = {
     "edges": {"umbra.disk.inner_radius": (3.0, 6.0), "umbra.disk.outer_radius": (9.0, 20.0)},
     "amounts": {
         "umbra.disk.doppler_brightness": (0.0, 1.0),
-        "umbra.disk.doppler_colour": (0.0, 1.0),
+        "umbra.disk.doppler_color": (0.0, 1.0),
         "umbra.disk.opacity": (0.3, 1.0),
         "umbra.disk.exponent": (0.5, 3.0),
         "umbra.disk.exposure": (0.0, 3.0),
@@ -302,33 +302,33 @@ def test_as_many_images_as_are_asked_for(
 
 
 @pytest.mark.parametrize("kind", ["float", "bytes", "opaque"])
-def test_a_picture_gives_the_disk_its_colours(
+def test_a_picture_gives_the_disk_its_colors(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType], modules: ModuleType, kind: str
 ) -> None:
     """A picture with alpha of eighths, which bytes and floats hold alike, in all looks that change with the motion."""
     height, width = 16, 64
     row, column = np.mgrid[0:height, 0:width]
     angle = 2.0 * math.pi * (column + 0.5) / width
-    colour = np.stack([0.5 + 0.4 * np.cos(angle), 0.4 + 0.3 * np.sin(2.0 * angle), 0.1 + 0.05 * row], axis=-1)
+    color = np.stack([0.5 + 0.4 * np.cos(angle), 0.4 + 0.3 * np.sin(2.0 * angle), 0.1 + 0.05 * row], axis=-1)
     alpha = np.ones((height, width)) if kind == "opaque" else 0.5 + 0.25 * np.round(2.0 * np.cos(3.0 * angle)) * 0.5
     image = bpy.data.images.new("Picture", width, height, float_buffer=kind != "bytes", alpha=kind != "opaque")
     if kind == "bytes":
-        encoded = np.round(colour * 255.0) / 255.0
-        colour = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+        encoded = np.round(color * 255.0) / 255.0
+        color = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
         alpha = np.round(alpha * 255.0) / 255.0
         pixels = np.concatenate([encoded, alpha[..., None]], axis=-1)
     else:
         image.colorspace_settings.name, image.alpha_mode = "Linear Rec.709", "PREMUL"
-        pixels = np.concatenate([colour * alpha[..., None], alpha[..., None]], axis=-1)
+        pixels = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
     image.pixels.foreach_set(pixels[::-1].astype(np.float32).ravel())
     image.pack()
-    hole = hole_with_disk(scene, texture=image, texture_use="COLOUR")
+    hole = hole_with_disk(scene, texture=image, texture_use="COLOR")
     if kind != "opaque":
-        for name, value in {"doppler_colour": 0.8, "doppler_brightness": 1.0, "profile": "novikov_thorne"}.items():
+        for name, value in {"doppler_color": 0.8, "doppler_brightness": 1.0, "profile": "novikov_thorne"}.items():
             setattr(hole.umbra.disk, name, value)
     scene.frame_set(30)
     picture = render(scene, tmp_path / "picture.exr", modules.exr)
-    premultiplied = np.concatenate([colour * alpha[..., None], alpha[..., None]], axis=-1)
+    premultiplied = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), premultiplied)
     assert_same(picture, expected, light)
     rows = addon_module("nodes.disk_images").mean_of_rows(image)

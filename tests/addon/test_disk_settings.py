@@ -196,7 +196,7 @@ def test_the_first_versions_group_gives_way_to_the_one_that_fits(
     former = bpy.data.node_groups.new("Umbra Disk", "CompositorNodeTree")
     former["umbra_disk_version"] = 1
     former.interface.new_socket("Disk", in_out="OUTPUT", socket_type="NodeSocketColor")
-    for name in ("Pass 1", "Pass 2", "Pass 3", "Profile", "Colours", "Texture"):
+    for name in ("Pass 1", "Pass 2", "Pass 3", "Profile", "Colors", "Texture"):
         former.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketColor")
     former.interface.new_socket("Pattern Phase", in_out="INPUT", socket_type="NodeSocketFloat")
     wanted = links_of(setup.tree), [curve.data_path for curve in setup.tree.animation_data.drivers]
@@ -255,7 +255,7 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     """A white plate close to the plane of a bright even disk is lit by the disk's own radiance."""
     settings = hole.umbra.disk
     values = {
-        "streaks": 0.0, "clumps": 0.0, "falloff": 0.0, "colour_variation": 0.0, "opacity": 1.0, "exposure": 0.0,
+        "streaks": 0.0, "clumps": 0.0, "falloff": 0.0, "color_variation": 0.0, "opacity": 1.0, "exposure": 0.0,
         "inner_softness": 0.0, "outer_softness": 0.0, "gain": 1.0, "temperature": 6500.0, "light": True,
     }  # fmt: skip
     for name, value in values.items():
@@ -291,7 +291,7 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     lit = pixels[12:15, 22:26].reshape(-1, 4)
     assert (lit[:, 3] == 1.0).all()
     assert pixels[0, 0, 3] == 0.0, "beside the plate there is nothing, not the glowing disk"
-    expected = modules.disk_look.seen_colour(np.array([6500.0]))[0]
+    expected = modules.disk_look.seen_color(np.array([6500.0]))[0]
     # The disk fills all but the horizon of what the plate sees; 256 samples a pixel, twelve pixels.
     np.testing.assert_allclose(lit[:, :3].mean(axis=0), expected, rtol=0.05)
 

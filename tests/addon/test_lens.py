@@ -167,8 +167,8 @@ def test_balls_are_seen_where_reference_rays_say(scene, tmp_path, exr, rays, pri
     side = (seen[:, 1:] * table["n_cs"][:, 1:]).sum(axis=1)
     chosen = np.flatnonzero(usable & (side > 0.05 if primary else side < -0.05))[:3]
     assert len(chosen) >= 2
-    for colour, ray in zip(np.eye(3)[: len(chosen)], chosen, strict=True):
-        add_ball(tuple(SPHERES * length * table["n_cs"][ray]), 0.02 * SPHERES * length, tuple(colour))
+    for color, ray in zip(np.eye(3)[: len(chosen)], chosen, strict=True):
+        add_ball(tuple(SPHERES * length * table["n_cs"][ray]), 0.02 * SPHERES * length, tuple(color))
     scene.camera.location, scene.camera.rotation_euler = (9.0 * length, 0.0, 0.0), (math.pi / 2, 0.0, math.pi / 2)
     scene.camera.data.lens, scene.camera.data.sensor_fit = 15.0, "HORIZONTAL"
     scene.cycles.samples = 64
@@ -217,7 +217,7 @@ def test_the_picture_does_not_depend_on_the_sphere_nor_on_the_map(scene, tmp_pat
 
 
 def show_directions(scene: bpy.types.Scene) -> None:
-    """Make the World's colour the direction that is looked up, and each sample one of a pixel's centre."""
+    """Make the World's color the direction that is looked up, and each sample one of a pixel's center."""
     scene.world = bpy.data.worlds.new("Directions")
     scene.world.use_nodes = True
     tree = scene.world.node_tree
@@ -235,8 +235,8 @@ def show_directions(scene: bpy.types.Scene) -> None:
 def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, addon_module, spin, motion, rays) -> None:
     """To 2e-4 radians two pixels and more away from the edge.
 
-    Cycles' narrowest filter places a sample within half a hundredth of a pixel of its centre: so much of the difference
-    between neighbours is allowed besides.
+    Cycles' narrowest filter places a sample within half a hundredth of a pixel of its center: so much of the difference
+    between neighbors is allowed besides.
     """
     physics = addon_module("core.physics_api").physics
     show_directions(scene)
@@ -268,7 +268,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
 
 @pytest.mark.parametrize("rays", ["IN_SHADER", "EXIT_MAP"])
 def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon_module, rays) -> None:
-    """A World of one colour, seen from a fast orbit: each pixel is that colour times the gain of its own 1 + z."""
+    """A World of one color, seen from a fast orbit: each pixel is that color times the gain of its own 1 + z."""
     physics, color = addon_module("core.physics_api").physics, addon_module("core.physics_api").color
     scene.world = bpy.data.worlds.new("Uniform")
     scene.world.use_nodes = True
@@ -276,12 +276,12 @@ def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
     add_lens(scene, 0.6, spin=0.9, motion="CIRCULAR")
     scene.umbra.lens_rays, scene.umbra.sky_temperature = rays, 5000.0
-    scene.umbra.redshift_colour, scene.umbra.redshift_brightness = 0.7, 1.0
+    scene.umbra.redshift_color, scene.umbra.redshift_brightness = 0.7, 1.0
     picture = render(scene, tmp_path / "shifted.exr", exr)[..., :3]
     warp_map = physics.bake(addon_module("scene.frame_setup").read_at(scene, scene.frame_current).parameters)
     clear = warp_map.visibility == 1.0
     gain = color.redshift_gain(warp_map.one_plus_z[clear].astype(float), 0.7, 1.0, 5000.0)
     expected = gain * np.array([0.8, 0.5, 0.2])
     assert expected[:, 0].max() > 1.5 * expected[:, 0].min()
-    # Single precision, and samples half a hundredth of a pixel off its centre.
+    # Single precision, and samples half a hundredth of a pixel off its center.
     assert picture[clear] == pytest.approx(expected, rel=5e-3)

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning
 
 @pytest.fixture
 def scene(tmp_path: Path) -> bpy.types.Scene:
-    """A small scene with a camera above the disk's plane, a World of one colour, and maps of its own."""
+    """A small scene with a camera above the disk's plane, a World of one color, and maps of its own."""
     scene = bpy.context.scene
     shrink(scene, (96, 54))
     scene.umbra.map_folder = str(tmp_path / "maps")

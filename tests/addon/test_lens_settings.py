@@ -39,14 +39,14 @@ def test_the_compositor_comes_back_with_its_look(scene, addon_module) -> None:
     assert bpy.ops.umbra.add_black_hole() == {"FINISHED"}
     find = addon_module("outputs.shared.compositor_tree").find_setup
     find(scene).group.inputs["Exposure"].default_value = 1.5
-    find(scene).group.inputs["Redshift Colour"].default_value = 0.25
+    find(scene).group.inputs["Redshift Color"].default_value = 0.25
     scene.umbra.output = "CYCLES_LENS"
     assert find(scene) is None
-    assert scene.umbra.redshift_colour == pytest.approx(0.25)
-    scene.umbra.redshift_colour = 0.5
+    assert scene.umbra.redshift_color == pytest.approx(0.25)
+    scene.umbra.redshift_color = 0.5
     scene.umbra.output = "COMPOSITOR"
     assert find(scene).group.inputs["Exposure"].default_value == pytest.approx(1.5)
-    assert find(scene).group.inputs["Redshift Colour"].default_value == pytest.approx(0.5)
+    assert find(scene).group.inputs["Redshift Color"].default_value == pytest.approx(0.5)
 
 
 def test_nearer_objects_come_in_front(scene, tmp_path, exr) -> None:

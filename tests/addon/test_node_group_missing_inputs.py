@@ -88,7 +88,7 @@ def test_missing_environment_is_black(node_group: ModuleType, tmp_path: Path, ki
     np.testing.assert_array_equal(picture, np.broadcast_to(np.float32((0, 0, 0, 1)), picture.shape))
 
 
-def test_plain_colour_as_environment(group: GroupRenderer) -> None:
+def test_plain_color_as_environment(group: GroupRenderer) -> None:
     warp_map = full_sphere_map(*SIZE)
     picture = group.render(SIZE, warp_map=warp_map, values={"Environment": (0.2, 0.3, 0.4, 1.0)})
     np.testing.assert_allclose(picture, np.broadcast_to((0.2, 0.3, 0.4, 1.0), picture.shape), rtol=0.0, atol=1e-7)

@@ -3,10 +3,10 @@
 
 The tolerances and why:
 
-COLOURS (2e-6, of values up to 1): a dozen float32 operations, each rounding by 6e-8, and logarithms and exponentials
+COLORS (2e-6, of values up to 1): a dozen float32 operations, each rounding by 6e-8, and logarithms and exponentials
 of the redshift.
 TEXELS (1e-4 of the brightest texel): a texture coordinate up to 1 is stored in steps of 6e-8, up to 0.5 in steps of
-3e-8. With 2048 x 1024 texels of which neighbours differ by all they can, rounding by half a step in u and in v is worth
+3e-8. With 2048 x 1024 texels of which neighbors differ by all they can, rounding by half a step in u and in v is worth
 3e-5 each.
 """
 
@@ -35,7 +35,7 @@ from compositor_scene import (
 from physics.numerics import sphere
 from physics.reference import reference_render
 
-COLOURS = 2e-6
+COLORS = 2e-6
 TEXELS = 1e-4
 SIZE = (64, 36)
 ROTATIONS = [
@@ -67,7 +67,7 @@ def test_smooth_sky_in_all_directions(group: GroupRenderer, rotation: tuple[floa
     warp_map, sky = full_sphere_map(*SIZE), smooth_environment(512, 256)
     picture = group.render(SIZE, warp_map=warp_map, environment=sky, values={"Environment Rotation": rotation})
     expected = reference_render.render(MapArrays.of(warp_map), sky, rotation=as_stored(rotation)).image
-    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLORS)
 
 
 @pytest.mark.parametrize("rotation", ROTATIONS)
@@ -95,15 +95,15 @@ def test_environment_of_odd_size(group: GroupRenderer) -> None:
 
 
 @pytest.mark.parametrize("brightness", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("colour", [0.0, 0.5, 1.0])
-def test_redshift_and_brightness(group: GroupRenderer, colour: float, brightness: float) -> None:
+@pytest.mark.parametrize("color", [0.0, 0.5, 1.0])
+def test_redshift_and_brightness(group: GroupRenderer, color: float, brightness: float) -> None:
     warp_map, sky = add_redshift_and_shadow(full_sphere_map(*SIZE)), smooth_environment(512, 256)
     picture = group.render(
         SIZE,
         warp_map=warp_map,
         environment=sky,
         values={
-            "Redshift Colour": colour,
+            "Redshift Color": color,
             "Redshift Brightness": brightness,
             "Sky Temperature": 4321.0,
             "Exposure": 1.5,
@@ -113,13 +113,13 @@ def test_redshift_and_brightness(group: GroupRenderer, colour: float, brightness
     expected = reference_render.render(
         MapArrays.of(warp_map),
         sky,
-        colour_amount=colour,
+        color_amount=color,
         brightness_amount=brightness,
         temperature=4321.0,
         exposure=1.5,
         strength=2.5,
     ).image
-    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLORS)
 
 
 @pytest.mark.parametrize("shift", [1e-4, 0.01, 100.0, 1e5])
@@ -127,8 +127,8 @@ def test_extreme_redshift_stays_finite(group: GroupRenderer, shift: float) -> No
     warp_map = full_sphere_map(8, 4)
     warp_map[..., 2] = shift
     flat = np.ones((2, 4, 4), dtype=np.float32)
-    picture = group.render((8, 4), warp_map=warp_map, environment=flat, values={"Redshift Colour": 0.25})
-    expected = reference_render.render(MapArrays.of(warp_map), flat, colour_amount=0.25).image
+    picture = group.render((8, 4), warp_map=warp_map, environment=flat, values={"Redshift Color": 0.25})
+    expected = reference_render.render(MapArrays.of(warp_map), flat, color_amount=0.25).image
     # The exponent of the gain reaches 50 and is rounded by 6e-8 of that.
     np.testing.assert_allclose(picture, expected, rtol=2e-5, atol=1e-30)
 
@@ -150,7 +150,7 @@ def test_supersampled_map_is_box_filtered(
     if expected.ndim == 2:
         picture = picture[..., 0]
     # A hundred pixels of a bright blueshifted sky may enter one mean: the tolerance is relative to it.
-    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLORS)
 
 
 @pytest.mark.parametrize("supersampling", [1, 2, 4])
@@ -161,7 +161,7 @@ def test_map_of_full_size_at_fifty_percent(group: GroupRenderer, size: tuple[int
     sky = smooth_environment(512, 256)
     picture = group.render(size, warp_map=warp_map, environment=sky, percentage=50)
     expected = reference_render.render(MapArrays.of(warp_map), sky, output_size=(width // 2, height // 2)).image
-    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=5e-6, atol=COLORS)
 
 
 @pytest.mark.parametrize(("size", "percentage"), [((65, 37), 50), ((64, 36), 75), ((32, 18), 200), ((31, 17), 150)])
@@ -184,7 +184,7 @@ def test_light_without_alpha_and_opaque_pixels(group: GroupRenderer) -> None:
     foreground[10:30, 20:24] = (0.1, 0.15, 0.2, 0.5)  # half covered, premultiplied
     picture = group.render(SIZE, warp_map=warp_map, environment=sky, foreground=foreground)
     expected = reference_render.render(MapArrays.of(warp_map), sky, foreground=foreground).image
-    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLORS)
     np.testing.assert_array_equal(picture[20:30, 10:20], foreground[20:30, 10:20])
 
 
@@ -219,4 +219,4 @@ def test_rendered_object_with_soft_edge_on_transparent_film(node_group: ModuleTy
     tree.links.new(node.outputs["Image"], target)
     picture = render_pixels(scene, tmp_path / "picture.exr")
     expected = reference_render.render(MapArrays.of(warp_map), sky, foreground=foreground).image
-    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLOURS)
+    np.testing.assert_allclose(picture, expected, rtol=0.0, atol=COLORS)

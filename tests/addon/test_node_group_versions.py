@@ -24,7 +24,7 @@ from compositor_scene import (
 from physics.reference import reference_render
 
 SIZE = (32, 18)
-VALUES = {"Environment Strength": 1.75, "Exposure": -0.5, "Redshift Colour": 0.25, "Sky Temperature": 5000.0}
+VALUES = {"Environment Strength": 1.75, "Exposure": -0.5, "Redshift Color": 0.25, "Sky Temperature": 5000.0}
 ROTATION = (0.1, 0.2, 0.3)
 
 
@@ -48,7 +48,7 @@ def test_sockets_are_complete_described_and_in_order(node_group: ModuleType) -> 
         "Environment Rotation",
         "Environment Strength",
         "Exposure",
-        "Redshift Colour",
+        "Redshift Color",
         "Redshift Brightness",
         "Sky Temperature",
         "Disk",
@@ -58,7 +58,7 @@ def test_sockets_are_complete_described_and_in_order(node_group: ModuleType) -> 
     by_name = {item.name: item for item in inputs}
     assert by_name["Environment Rotation"].subtype == "EULER"
     assert by_name["Sky Temperature"].subtype == "COLOR_TEMPERATURE"
-    for name in ("Redshift Colour", "Redshift Brightness"):
+    for name in ("Redshift Color", "Redshift Brightness"):
         item = by_name[name]
         assert (item.subtype, item.min_value, item.max_value, item.default_value) == ("FACTOR", 0.0, 1.0, 1.0)
 
@@ -74,7 +74,7 @@ def test_built_once_and_found_again(node_group: ModuleType) -> None:
     assert len([each for each in bpy.data.node_groups if node_group.is_group(each)]) == 1
 
 
-def test_every_node_lies_in_a_labelled_frame_apart_from_the_ends(node_group: ModuleType) -> None:
+def test_every_node_lies_in_a_labeled_frame_apart_from_the_ends(node_group: ModuleType) -> None:
     tree = node_group.ensure_group()
     ends = {"NodeGroupInput", "NodeGroupOutput", "NodeFrame"}
     assert all(node.parent is not None for node in tree.nodes if node.bl_idname not in ends)
@@ -177,7 +177,7 @@ def test_repair_keeps_values_links_and_picture(
         rotation=[float(np.float32(angle)) for angle in ROTATION],
         strength=VALUES["Environment Strength"],
         exposure=VALUES["Exposure"],
-        colour_amount=VALUES["Redshift Colour"],
+        color_amount=VALUES["Redshift Color"],
         temperature=VALUES["Sky Temperature"],
     ).image
     np.testing.assert_allclose(picture, expected, rtol=0.0, atol=2e-6)

@@ -247,7 +247,7 @@ def test_a_far_away_hole_shows_the_world_as_cycles_does(
     nodes["mapping"].inputs["Rotation"].default_value = (0.4, -0.3, 1.2)
     nodes["background"].inputs["Strength"].default_value = 1.7
     bpy.data.objects.remove(bpy.data.objects["Cube"])
-    scene.cycles.filter_width = 0.01  # Cycles looks the World up at the pixel's centre
+    scene.cycles.filter_width = 0.01  # Cycles looks the World up at the pixel's center
     own = render(scene, tmp_path / "own.exr", exr)
     add_hole(scene, sky=False, mass_scale=1e-7)
     ours = render(scene, tmp_path / "ours.exr", exr)

@@ -66,8 +66,8 @@ def test_rotated_scaled_moved_hole_with_a_parent(shot: ModuleType) -> None:
     parameters = read(shot)
 
     turn = Euler((0.3, -0.2, 0.9)).to_matrix() @ Euler((-1.1, 0.4, 0.2)).to_matrix()
-    centre = Vector((1.0, -2.0, 0.5)) + Euler((0.3, -0.2, 0.9)).to_matrix() @ (2.0 * Vector((0.4, 0.1, -0.3)))
-    in_hole = turn.transposed() @ (Vector((7.0, -6.0, 5.0)) - centre) / (0.25 * 3.0)
+    center = Vector((1.0, -2.0, 0.5)) + Euler((0.3, -0.2, 0.9)).to_matrix() @ (2.0 * Vector((0.4, 0.1, -0.3)))
+    in_hole = turn.transposed() @ (Vector((7.0, -6.0, 5.0)) - center) / (0.25 * 3.0)
     assert parameters.camera_position == pytest.approx(tuple(in_hole), abs=2e-5)
     np.testing.assert_allclose(parameters.hole_to_world, np.array(turn), atol=2e-6)
     camera_axes = Euler((1.1, 0.1, 0.8)).to_matrix()

@@ -71,7 +71,7 @@ def map_of(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1):
 
 
 def looking(scene: bpy.types.Scene, physics: ModuleType) -> np.ndarray:
-    """World directions of the pixels' centres, row by row from the top."""
+    """World directions of the pixels' centers, row by row from the top."""
     width, height = SIZE
     data = scene.camera.data
     camera = physics.physics.PerspectiveCamera(width, height, focal_length=data.lens, sensor_width=data.sensor_width)
@@ -85,11 +85,11 @@ def predicted(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tu
     where Blender's own environment look-up reaches over to the other pole."""
     origin, one_plus_z, visible = map_of(scene, physics, frame).look_up(looking(scene, physics))
     turned = origin @ physics.reference_render.rotation_matrix(ROTATION).T
-    colours = physics.reference_render.sample_environment(environment_pixels(), turned)
-    colours *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
-    colours[~visible] = 0.0
+    colors = physics.reference_render.sample_environment(environment_pixels(), turned)
+    colors *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
+    colors[~visible] = 0.0
     polar = np.arccos(np.abs(turned[:, 2]).clip(max=1.0))
-    return colours.reshape(*SIZE[::-1], 3), (polar > math.pi / 16).reshape(SIZE[::-1])
+    return colors.reshape(*SIZE[::-1], 3), (polar > math.pi / 16).reshape(SIZE[::-1])
 
 
 def differences(picture: np.ndarray, expected: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -231,12 +231,12 @@ def test_the_look_goes_with_the_output(scene) -> None:
     use_sky(scene)
     assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
     node = next(each for each in scene_tree(scene).nodes if each.name == "Umbra Black Hole")
-    node.inputs["Exposure"].default_value, node.inputs["Redshift Colour"].default_value = 1.5, 0.25
+    node.inputs["Exposure"].default_value, node.inputs["Redshift Color"].default_value = 1.5, 0.25
     node.inputs["Environment Rotation"].default_value = (0.0, 0.0, 0.5)
     switch()
     assert scene.world.node_tree.nodes["Mapping"].inputs["Rotation"].default_value[2] == 0.5
     assert group(scene).inputs["Exposure"].default_value == 1.5
-    assert group(scene).inputs["Redshift Colour"].default_value == 0.25
+    assert group(scene).inputs["Redshift Color"].default_value == 0.25
     group(scene).inputs["Redshift Brightness"].default_value = 0.5
     group(scene).inputs["Exposure"].default_value = 2.0
     switch("CYCLES_LENS")
@@ -252,7 +252,7 @@ def scene_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
 
 
 def test_any_world_is_bent(scene, physics, tmp_path) -> None:
-    """Nodes of any kind that look at Generated coordinates, also a plain colour, which has a shadow in it."""
+    """Nodes of any kind that look at Generated coordinates, also a plain color, which has a shadow in it."""
     tree = scene.world.node_tree
     tree.nodes.clear()
     background, output = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeOutputWorld")
@@ -260,7 +260,7 @@ def test_any_world_is_bent(scene, physics, tmp_path) -> None:
     background.inputs["Color"].default_value = (0.2, 0.4, 0.8, 1.0)
     switch()
     group(scene).inputs["Redshift Brightness"].default_value = 0.0
-    group(scene).inputs["Redshift Colour"].default_value = 0.0
+    group(scene).inputs["Redshift Color"].default_value = 0.0
     picture = render(scene, tmp_path / "picture.exr", physics.exr)
     visible = map_of(scene, physics).look_up(looking(scene, physics))[2].reshape(SIZE[::-1])
     shown = picture[..., 2] > 0.4

@@ -25,7 +25,7 @@ def test_messages_are_found_in_the_source():
         "This scene has no black hole.",  # the panel
         "note: … pixels could not be resolved and will show magenta",  # standard error
         "Frame … was rendered without its warp map or lens.",  # handed on to be said
-        "Warp maps are being baked already",  # why a button is grey
+        "Warp maps are being baked already",  # why a button is gray
     ):
         assert expected in texts
     assert len(texts) > 120

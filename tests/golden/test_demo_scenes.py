@@ -97,7 +97,7 @@ def rendered(composed: object, addon_module: Callable[[str], ModuleType], tmp_pa
         read_warp_map(map_path),
         _packed_pixels(sky.image, tmp_path / "sky.exr"),
         rotation=rotation,
-        colour_amount=inputs["Redshift Colour"].default_value,
+        color_amount=inputs["Redshift Color"].default_value,
         brightness_amount=inputs["Redshift Brightness"].default_value,
         temperature=inputs["Sky Temperature"].default_value,
         exposure=inputs["Exposure"].default_value,
@@ -203,7 +203,7 @@ def test_orbit_with_a_disk_shares_its_rays(
 
 
 def seen_objects(scene: object, addon_module: Callable[[str], ModuleType]) -> tuple[np.ndarray, np.ndarray]:
-    """Per pixel the pass index of the object that the ray of its centre meets, 0 for none; and where there is sky."""
+    """Per pixel the pass index of the object that the ray of its center meets, 0 for none; and where there is sky."""
     import bpy
 
     frame = addon_module("scene.frame_setup").read_at(scene, FRAME)
@@ -243,11 +243,11 @@ def light_up_by_index(scene: object) -> None:
     links.new(light.outputs["Emission"], output.inputs["Surface"])
     scene.view_layers[0].material_override = shine
     scene.world = None
-    scene.umbra.redshift_colour = scene.umbra.redshift_brightness = 0.0
+    scene.umbra.redshift_color = scene.umbra.redshift_brightness = 0.0
 
 
 def surrounded(same: np.ndarray) -> np.ndarray:
-    """Where a pixel and its eight neighbours are true; Cycles' filter is 1.5 pixels wide."""
+    """Where a pixel and its eight neighbors are true; Cycles' filter is 1.5 pixels wide."""
     inner = np.pad(same, 1, constant_values=False)
     rows, columns = same.shape
     shifted = [inner[i : i + rows, j : j + columns] for i in range(3) for j in range(3)]

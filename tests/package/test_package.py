@@ -69,7 +69,7 @@ def shipped_files() -> set[str]:
     return found
 
 
-def test_contains_the_code_the_licence_the_wheels_and_nothing_else(published: zipfile.ZipFile) -> None:
+def test_contains_the_code_the_license_the_wheels_and_nothing_else(published: zipfile.ZipFile) -> None:
     names = {name for name in published.namelist() if not name.endswith("/")}
     wheels = {name for name in names if name.startswith("wheels/")}
     assert names - wheels == shipped_files() | {"LICENSE"}

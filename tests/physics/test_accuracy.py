@@ -59,7 +59,7 @@ def spoiled(warp_map, **planes):
 
 
 def independent_directions(parameters, warp_map):
-    """World directions and 1 + z at pixel centres from `trace_rays` alone, with axes worked out here.
+    """World directions and 1 + z at pixel centers from `trace_rays` alone, with axes worked out here.
 
     The observer of a circular orbit moves along phi-hat, so its y axis is phi-hat; Eq. 4 measures theta_rd from its z
     axis, which is -theta-hat, and phi_rd from x, along r-hat.

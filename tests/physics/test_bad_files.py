@@ -252,7 +252,7 @@ def test_kinds_of_files(tmp_path):
 def test_channels_that_are_not_those_of_a_picture(tmp_path):
     path = tmp_path / "channels.exr"
     written(path, planes("XYZ"))
-    assert read_exr(path)[0].shape[2] == 3  # luminance alone is grey
+    assert read_exr(path)[0].shape[2] == 3  # luminance alone is gray
     written(path, planes("RG"))
     assert "no channels R, G and B" in assert_refused(path)
     data = written(path, planes("RGB"))

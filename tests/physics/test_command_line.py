@@ -64,9 +64,9 @@ def test_bake_writes_a_map_of_what_was_asked(baked):
 
 @pytest.mark.parametrize("ending", ["png", "exr"])
 def test_render_over_an_even_sky(baked, sky, tmp_path, ending):
-    """A sky of one colour without redshift shows the sky's colour, and the shadow as black."""
+    """A sky of one color without redshift shows the sky's color, and the shadow as black."""
     output = tmp_path / f"picture.{ending}"
-    result = run("render", baked, sky, output, "--redshift-colour", 0, "--redshift-brightness", 0)
+    result = run("render", baked, sky, output, "--redshift-color", 0, "--redshift-brightness", 0)
     assert result.returncode == 0, result.stderr
     visibility = read_warp_map(baked).visibility.reshape(36, 2, 64, 2).mean(axis=(1, 3))
     if ending == "png":

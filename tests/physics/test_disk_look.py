@@ -220,7 +220,7 @@ def test_flux_peaks_where_it_is_known_to():
 
 def test_amounts_go_from_artistic_to_physical():
     disk, radius = Disk(), np.array([10.0])
-    still = DiskLook(doppler_colour=0.0, doppler_brightness=0.0)
+    still = DiskLook(doppler_color=0.0, doppler_brightness=0.0)
     assert np.array_equal(
         emission(still, disk, 0.5, radius, np.array([0.5])), emission(still, disk, 0.5, radius, np.array([1.5]))
     )
@@ -261,7 +261,7 @@ def test_shear_stays_bounded_in_a_long_shot_without_a_jump():
         for age, _, _ in shares:
             fast, slow = orbital_frequency(spin, np.array([inner, outer]))
             assert 0.0 <= (fast - slow) * age <= 2.0 * math.pi * SHEAR_TURNS * (1.0 + 1e-9)
-        # Contrast stays: neither patterns sheared to noise nor two averaged to grey.
+        # Contrast stays: neither patterns sheared to noise nor two averaged to gray.
         assert moving_texture(TEXTURE, radius, phi, time, spin, inner, outer)[:, 1].std() > 0.1
     # Across a pattern's end and beginning nothing jumps.
     ends = [moving_texture(TEXTURE, radius, phi, 7.0 * period + t, spin, inner, outer) for t in (-1e-6, 1e-6)]
@@ -281,15 +281,15 @@ def test_compositing_is_that_of_a_loop_over_pixels(baked):
     disk = Disk(**baked.metadata["parameters"]["disk"])
     partly = 0
     for row, column in np.ndindex(27, 48):
-        colour, left = np.zeros(3), 1.0
+        color, left = np.zeros(3), 1.0
         for one in baked.disk_passes:
             place = [np.float64(plane[row, column]) for plane in (one.radius, one.phi, one.g, one.coverage)]
             if place[3] > 0.0:
                 face, opacity = shade(look, disk, 0.8, tuple(np.array([x]) for x in place), TEXTURE, time)
-                colour += left * opacity[0] * place[3] * face[0]
+                color += left * opacity[0] * place[3] * face[0]
                 left *= 1.0 - opacity[0] * place[3]
         partly += 0.0 < left < 1.0
-        assert picture[row, column, :3] == pytest.approx(colour + left * sky[row, column, :3], rel=1e-9, abs=1e-12)
+        assert picture[row, column, :3] == pytest.approx(color + left * sky[row, column, :3], rel=1e-9, abs=1e-12)
         assert picture[row, column, 3] == pytest.approx(1.0 - left + left * sky[row, column, 3], rel=1e-9)
     assert partly > 100
     opaque = over_sky(sky[..., :3], light, through)
@@ -300,19 +300,19 @@ def test_compositing_is_that_of_a_loop_over_pixels(baked):
 PLACE = np.array([4.0, 8.0, 12.0]), np.array([0.3, 2.0, 5.0]), np.array([0.5, 1.0, 1.4]), np.ones(3)
 
 
-def test_an_even_picture_shows_its_colour_at_any_time():
+def test_an_even_picture_shows_its_color_at_any_time():
     """Premultiplied, alpha one half: two patterns mixed give back what both are; the look's factors are known."""
     picture = np.broadcast_to([0.4, 0.2, 0.1, 0.5], (8, 16, 4))
     disk = Disk(inner_radius=3.0, outer_radius=20.0)
     look = DiskLook(
-        falloff=0.0, doppler_colour=0.0, doppler_brightness=0.0, exposure=1.0, opacity=0.8, inner_softness=0.0,
+        falloff=0.0, doppler_color=0.0, doppler_brightness=0.0, exposure=1.0, opacity=0.8, inner_softness=0.0,
         outer_softness=0.0,
     )  # fmt: skip
     for time in (0.0, 12.3, 4567.8):
         light, opacity = shade(look, disk, 0.5, PLACE, picture, time)
         np.testing.assert_allclose(light, np.tile([1.6, 0.8, 0.4], (3, 1)), rtol=1e-12)
         np.testing.assert_allclose(opacity, 0.4, rtol=1e-12)
-    moving = dataclasses.replace(look, doppler_colour=1.0, doppler_brightness=1.0)
+    moving = dataclasses.replace(look, doppler_color=1.0, doppler_brightness=1.0)
     light, _ = shade(moving, disk, 0.5, PLACE, picture, 0.0)
     # The black body's own light at g T, whose sum over all wavelengths goes by g^4, against that at T.
     x = 1.438776877e-2 / (np.array([611.4e-9, 549.1e-9, 464.3e-9]) * look.temperature)

@@ -105,16 +105,16 @@ def test_passes_are_those_of_rays_traced_everywhere(parameters):
     counted = counted_coverage(parameters, columns, rows)
     inner, outer = parameters.disk.radii(parameters.spin)
     count = parameters.disk.crossings
-    (centre, light), *beside = (
+    (center, light), *beside = (
         View(parameters).crossings(columns + 0.5 + right, rows + 0.5 + down, count, 1e-9, "gauss-legendre")
         for right, down in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
     g, *g_beside = (
         each.g(parameters.spin, there.u, there.u_slope, parameters.disk.retrograde)
-        for there, each in ((centre, light), *beside)
+        for there, each in ((center, light), *beside)
     )
     change_of_g = np.hypot(*(there / g - 1.0 for there in g_beside))
-    change_of_radius = np.hypot(*(there.u / centre.u - 1.0 for there, _ in beside))
+    change_of_radius = np.hypot(*(there.u / center.u - 1.0 for there, _ in beside))
     assert (passes[0].coverage > 0.0).any()
     for order, one in enumerate(passes):
         share = one.coverage[rows, columns]
@@ -133,14 +133,14 @@ def test_passes_are_those_of_rays_traced_everywhere(parameters):
         assert ((one.radius[seen] >= inner * (1 - 1e-6)) & (one.radius[seen] <= outer * (1 + 1e-6))).all()
         assert (one.g[seen] > 0.0).all()
         whole = (share == 1.0) & (counted[order] == 1.0)
-        assert (np.isnan(centre.u[order]) & whole).sum() <= 2  # such a ray asks for more points than there are
-        whole &= np.isfinite(centre.u[order])
+        assert (np.isnan(center.u[order]) & whole).sum() <= 2  # such a ray asks for more points than there are
+        whole &= np.isfinite(center.u[order])
         if whole.sum() > 20:
-            radius = np.abs(one.radius[rows, columns] * centre.u[order] - 1.0)[whole]
-            phi = centre.unwound[order][whole] + winding(parameters.spin, centre.u[order][whole])
+            radius = np.abs(one.radius[rows, columns] * center.u[order] - 1.0)[whole]
+            phi = center.unwound[order][whole] + winding(parameters.spin, center.u[order][whole])
             turn = np.abs((one.phi[rows, columns][whole] - phi + math.pi) % (2 * math.pi) - math.pi)
             shift = np.abs(one.g[rows, columns] / g[order] - 1.0)[whole]
-            # 2e-4 is promised, and where the image is crowded a share of what neighbouring pixels differ by.
+            # 2e-4 is promised, and where the image is crowded a share of what neighboring pixels differ by.
             crowd = PIXEL_ERROR * change_of_radius[order][whole]
             assert np.median(radius / np.fmax(2e-4, crowd)) < 1.0
             assert np.median(turn / np.fmax(2e-4, crowd)) < 1.0

@@ -129,13 +129,13 @@ def test_exit_map_is_what_rays_say_and_agrees_with_the_warp_map():
 
 
 def test_usable_pixels_interpolate_as_well_as_they_claim():
-    """Between the centres of four usable pixels, rays of their own; three times the bound for what it leaves out."""
+    """Between the centers of four usable pixels, rays of their own; three times the bound for what it leaves out."""
     parameters = shot(320, 180, radius=30.0, spin=0.9, motion="fido")
     exits = bake_exit_map(parameters)
     finer = bake_exit_map(dataclasses.replace(parameters, supersampling=2, interpolation=0.0))
     cells = exits.usable[:-1, :-1] * exits.usable[1:, :-1] * exits.usable[:-1, 1:] * exits.usable[1:, 1:] == 1.0
     assert cells.sum() > 1000
-    # fine pixel (2 j + 1, 2 i + 1) has its centre a quarter of the way from coarse centre (j, i) to the next
+    # fine pixel (2 j + 1, 2 i + 1) has its center a quarter of the way from coarse center (j, i) to the next
     weights = ((0.75, 0.75, 0, 0), (0.75, 0.25, 0, 1), (0.25, 0.75, 1, 0), (0.25, 0.25, 1, 1))
     height, width = cells.shape
     mean = sum(wy * wx * exits.direction[j : j + height, i : i + width].astype(float) for wy, wx, j, i in weights)

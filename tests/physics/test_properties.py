@@ -207,8 +207,8 @@ def test_any_look_of_a_disk(name, value):
 
 @many
 @given(numbers, numbers, numbers, numbers)
-def test_any_change_of_colour(one_plus_z, colour, brightness, temperature):
-    gain = answered(lambda: redshift_gain(one_plus_z, colour, brightness, temperature))
+def test_any_change_of_color(one_plus_z, color, brightness, temperature):
+    gain = answered(lambda: redshift_gain(one_plus_z, color, brightness, temperature))
     assert gain is None or (np.isfinite(gain).all() and (gain >= 0.0).all())
 
 

@@ -50,7 +50,7 @@ def test_methods_keep_their_promises(name, settings, median, norm, method):
 @pytest.mark.parametrize("method", ["gauss-legendre", "cash-karp"])
 @pytest.mark.parametrize("name", CAMERAS)
 def test_rays_next_to_the_critical_curve_are_resolved_to_float64s_limit(name, method):
-    """Down to 1e-10 rad from the edge, where neighbouring rays part 1e10 times, errors stay those of rounding."""
+    """Down to 1e-10 rad from the edge, where neighboring rays part 1e10 times, errors stay those of rounding."""
     rows = CAMERAS[name].rows
     _, error, _, _ = compare(CAMERAS[name], tolerance=1e-10, method=method)
     # An error of one rounding (1e-16) of the ray's direction, b and q, amplified; 1e3 roundings are allowed, and

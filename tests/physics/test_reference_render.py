@@ -38,7 +38,7 @@ def random_map(width: int, height: int) -> Map:
 
 
 def analytic_sky(directions: FloatArray) -> FloatArray:
-    """Colours that are smooth on the sphere, poles and seam included."""
+    """Colors that are smooth on the sphere, poles and seam included."""
     x, y, z = np.moveaxis(directions, -1, 0)
     return np.stack([1.0 + x, 1.0 + y * z, 1.0 + 0.5 * (x - y + z)], axis=-1)
 
@@ -67,7 +67,7 @@ def test_smooth_sky_is_seen_where_it_is() -> None:
     np.testing.assert_allclose(picture.sky[..., :3], expected, rtol=0.0, atol=1.5 * step)
 
 
-def test_texel_centres_give_texels_exactly() -> None:
+def test_texel_centers_give_texels_exactly() -> None:
     environment = np.random.default_rng(1).random((6, 10, 4))
     column, row = np.meshgrid(np.arange(10), np.arange(6))
     directions = unit_vectors((row + 0.5) / 6.0 * np.pi, (0.5 - (column + 0.5) / 10.0) * 2.0 * np.pi)
@@ -131,7 +131,7 @@ def test_one_pixel_by_hand() -> None:
     picture = render(
         warp_map,
         environment,
-        colour_amount=0.7,
+        color_amount=0.7,
         brightness_amount=0.2,
         temperature=5000.0,
         exposure=2.0,

@@ -49,7 +49,7 @@ def test_half_way_between_nodes_is_what_cubics_say(sides):
     np.testing.assert_allclose(again, azimuth, atol=1e-5)
 
 
-def test_what_is_not_known_spreads_no_farther_than_its_neighbours():
+def test_what_is_not_known_spreads_no_farther_than_its_neighbors():
     coarse, _ = image(ANGLES, COLUMNS, 1, (False, False))
     coarse[:, 40, 10] = np.nan
     rows, columns = np.nonzero(np.isnan(between(coarse)).any(axis=0))

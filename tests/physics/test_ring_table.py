@@ -44,8 +44,8 @@ def around_the_edge(view, count):
     x, y = view.outline()
     chosen = random.integers(0, len(x), count)
     factor = 1.0 + random.choice([-1.0, 1.0], count) * 10.0 ** random.uniform(-4.0, -0.1, count)
-    centre_x, centre_y = view.centre()
-    return centre_x + (x[chosen] - centre_x) * factor, centre_y + (y[chosen] - centre_y) * factor
+    center_x, center_y = view.center()
+    return center_x + (x[chosen] - center_x) * factor, center_y + (y[chosen] - center_y) * factor
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -66,7 +66,7 @@ def test_what_a_table_answers_is_what_rays_say(name):
         on_disk = (exact > 1.0 / outer) & (exact < 1.0 / inner)
         assert on_disk.sum() > 100
         assert (known & on_disk).sum() > 0.5 * on_disk.sum()
-        # A share of what neighbouring pixels differ by, or the error of place that is allowed everywhere; and twice
+        # A share of what neighboring pixels differ by, or the error of place that is allowed everywhere; and twice
         # that, because differences of the grid tell its errors to a factor only.
         pixel = np.hypot(beside.u[order] - exact, below.u[order] - exact)
         allowed = np.maximum(2.0 * PIXEL_ERROR * pixel, 2.0 * PLACE_ERROR * parameters.interpolation / outer)

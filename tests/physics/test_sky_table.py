@@ -107,7 +107,7 @@ def test_other_places_and_exact_maps_share_nothing():
 
 
 def test_a_table_that_answers_too_little_is_not_asked_again():
-    """Close to the flat side of a hole at full speed hardly a ray has a neighbour that tells where it comes from."""
+    """Close to the flat side of a hole at full speed hardly a ray has a neighbor that tells where it comes from."""
     base = shot(160, 90, spin=0.9999, radius=4.0, fov=20.0, inclination=90.0, motion="fido")
     frames = [turned(base, angle) for angle in (0.45, 0.46, 0.47)]
     baker = MapBaker()

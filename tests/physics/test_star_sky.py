@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panorama of the real stars against published positions, magnitudes and colours."""
+"""The panorama of the real stars against published positions, magnitudes and colors."""
 
 import math
 
@@ -8,7 +8,7 @@ import pytest
 
 from physics import BlackHoleError
 from physics.light.milky_way import galactic_axes, unresolved_glow
-from physics.light.star_color import LUMINANCE_WEIGHTS, black_body_colour, temperature_from_colour_index
+from physics.light.star_color import LUMINANCE_WEIGHTS, black_body_color, temperature_from_color_index
 from physics.light.star_sky import (
     ZERO_MAGNITUDE,
     Stars,
@@ -60,7 +60,7 @@ def directions() -> np.ndarray:
 
 
 @pytest.mark.parametrize("height", [16, 100, 512])
-def test_all_the_light_of_the_catalogue_is_there(height: int) -> None:
+def test_all_the_light_of_the_catalog_is_there(height: int) -> None:
     expected = np.sum(10.0 ** (-0.4 * load_stars().magnitude)) * ZERO_MAGNITUDE
     picture = star_sky(height, galactic_glow=False)
     assert picture.shape == (height, 2 * height, 3)
@@ -125,17 +125,17 @@ def test_the_seam_is_invisible() -> None:
 
 def test_hot_stars_are_blue_and_cool_stars_are_red() -> None:
     # Rigel, Sirius, the Sun, Arcturus, Betelgeuse
-    colours = black_body_colour(temperature_from_colour_index([-0.03, 0.01, 0.65, 1.23, 1.85]))
-    blue_over_red = colours[:, 2] / colours[:, 0]
+    colors = black_body_color(temperature_from_color_index([-0.03, 0.01, 0.65, 1.23, 1.85]))
+    blue_over_red = colors[:, 2] / colors[:, 0]
     assert np.all(np.diff(blue_over_red) < 0.0)
     assert blue_over_red[0] > 1.0 > blue_over_red[2]
-    np.testing.assert_allclose(colours @ LUMINANCE_WEIGHTS, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(colors @ LUMINANCE_WEIGHTS, 1.0, rtol=1e-12)
 
 
 def test_temperature_of_the_sun() -> None:
     # B-V = 0.65 gives 5778 K (IAU nominal 5772 K).
-    assert temperature_from_colour_index(0.65) == pytest.approx(5772.0, abs=20.0)
-    assert temperature_from_colour_index(math.nan) == pytest.approx(6600.0, abs=50.0)
+    assert temperature_from_color_index(0.65) == pytest.approx(5772.0, abs=20.0)
+    assert temperature_from_color_index(math.nan) == pytest.approx(6600.0, abs=50.0)
 
 
 @pytest.mark.parametrize(
@@ -147,38 +147,38 @@ def test_black_body_chromaticity(temperature: float, x: float, y: float) -> None
     rec709_to_xyz = np.array(  # IEC 61966-2-1
         [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
     )
-    tristimulus = rec709_to_xyz @ black_body_colour(temperature)
+    tristimulus = rec709_to_xyz @ black_body_color(temperature)
     np.testing.assert_allclose(tristimulus[:2] / tristimulus.sum(), [x, y], atol=0.003)
 
 
-def test_extreme_stars_have_a_colour_within_the_gamut() -> None:
-    colours = black_body_colour(temperature_from_colour_index([-0.4, 5.46]))
-    assert np.all(np.isfinite(colours))
-    assert np.all(colours >= 0.0)
-    assert colours[1, 2] == 0.0
+def test_extreme_stars_have_a_color_within_the_gamut() -> None:
+    colors = black_body_color(temperature_from_color_index([-0.4, 5.46]))
+    assert np.all(np.isfinite(colors))
+    assert np.all(colors >= 0.0)
+    assert colors[1, 2] == 0.0
 
 
-def test_galactic_axes_point_to_the_centre_and_the_pole() -> None:
+def test_galactic_axes_point_to_the_center_and_the_pole() -> None:
     axes = galactic_axes()
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-    # Centre 17h 45m 37.2s -28 56' 10", pole 12h 51m 26.3s +27 07' 42" (J2000).
+    # Center 17h 45m 37.2s -28 56' 10", pole 12h 51m 26.3s +27 07' 42" (J2000).
     np.testing.assert_allclose(axes[0], direction(266.4050, -28.9362), atol=2e-5)
     np.testing.assert_allclose(axes[2], direction(192.8595, 27.1283), atol=2e-5)
 
 
 def test_the_glow_has_the_sky_s_brightness() -> None:
-    """Integrated starlight: some 10 to 50 S10 at the poles, hundreds in the plane, most near the centre."""
+    """Integrated starlight: some 10 to 50 S10 at the poles, hundreds in the plane, most near the center."""
     glow = unresolved_glow(0.0)
-    centre, sideways, pole = galactic_axes()
+    center, sideways, pole = galactic_axes()
     assert 10.0 < glow(pole) / S10 < 50.0
     assert 100.0 < glow(sideways) / S10 < 400.0
-    assert 50.0 < glow(-centre) / S10 < glow(sideways) / S10
+    assert 50.0 < glow(-center) / S10 < glow(sideways) / S10
     assert glow(pole) == pytest.approx(glow(-pole))
-    # Dust hides the centre itself: the sky is brightest a few degrees beside the plane.
-    tilted = math.cos(math.radians(5)) * centre + math.sin(math.radians(5)) * pole
+    # Dust hides the center itself: the sky is brightest a few degrees beside the plane.
+    tilted = math.cos(math.radians(5)) * center + math.sin(math.radians(5)) * pole
     assert 400.0 < glow(tilted) / S10 < 1200.0
-    assert glow(tilted) > glow(centre)
+    assert glow(tilted) > glow(center)
 
 
 def test_no_light_is_counted_twice() -> None:

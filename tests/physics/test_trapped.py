@@ -93,7 +93,7 @@ def test_edge_function_has_the_sign_of_the_fate(spin, observer):
 @pytest.mark.parametrize("radius", [1e3, 1e4, 1e6, 1e9])
 @pytest.mark.parametrize("spin", [0.0, 0.5, 0.999])
 def test_edge_function_keeps_its_sign_for_distant_holes(spin, radius):
-    """Rays within a few shadow radii of a hole's centre, where R(r_cam) and Y^2 are equal to the last digits."""
+    """Rays within a few shadow radii of a hole's center, where R(r_cam) and Y^2 are equal to the last digits."""
     random = np.random.default_rng(1)
     angle, turn = 20.0 / radius * np.sqrt(random.uniform(size=5000)), random.uniform(0.0, 2.0 * math.pi, 5000)
     looking = np.stack([-np.cos(angle), np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn)], axis=-1)

@@ -26,7 +26,7 @@ from physics import (
 from physics.maps import painting
 
 
-def test_pixels_are_the_rays_of_their_centres():
+def test_pixels_are_the_rays_of_their_centers():
     """The map against `trace_rays`, by a camera frame set up by hand: circular orbit, B = phi-hat."""
     parameters = shot(inclination=90.0, radius=8.0, spin=0.9)
     warp_map = bake(parameters)

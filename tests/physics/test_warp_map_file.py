@@ -232,11 +232,11 @@ def test_pictures_of_other_kinds(tmp_path):
     pixels, header = read_exr(tmp_path / "half.exr")
     assert np.array_equal(pixels, half.astype(np.float32))
     assert header["size"] == (5, 4)
-    grey = np.ones((3, 2), np.float32)
-    with OpenEXR.File({}, {"Y": grey}) as file:
-        file.write(str(tmp_path / "grey.exr"))
-    assert read_exr(tmp_path / "grey.exr")[0].shape == (3, 2, 3)
-    with OpenEXR.File({}, {"depth": grey}) as file:
+    gray = np.ones((3, 2), np.float32)
+    with OpenEXR.File({}, {"Y": gray}) as file:
+        file.write(str(tmp_path / "gray.exr"))
+    assert read_exr(tmp_path / "gray.exr")[0].shape == (3, 2, 3)
+    with OpenEXR.File({}, {"depth": gray}) as file:
         file.write(str(tmp_path / "depth.exr"))
     with pytest.raises(ImageFileError, match=r"depth\.exr has no channels R, G and B"):
         read_exr(tmp_path / "depth.exr")

@@ -48,7 +48,7 @@ def values_of(scene: bpy.types.Scene, frame: frame_setup.Shot, map_path: Path | 
         "aperture": frame.aperture,
         "length_of_m": frame.length_of_m,
         "sphere_radius": float(settings.sphere_radius),
-        "redshift_colour": float(settings.redshift_colour),
+        "redshift_color": float(settings.redshift_color),
         "redshift_brightness": float(settings.redshift_brightness),
         "temperature": float(settings.sky_temperature),
     }

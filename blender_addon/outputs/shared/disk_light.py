@@ -77,7 +77,7 @@ def radiance(
 ) -> NDArray:
     """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
 
-    `rows`, shape (rows, 4), are the means round the disk of the picture whose colours it has.
+    `rows`, shape (rows, 4), are the means round the disk of the picture whose colors it has.
     """
     if rows is not None:
         inner, outer = disk.radii(spin)
@@ -107,10 +107,10 @@ def _fill(
     others = np.stack([(ring + 1) * SEGMENTS + after, ring * SEGMENTS + after], axis=-1)
     mesh.clear_geometry()
     mesh.from_pydata(places.tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
-    colours = np.ones((RINGS, SEGMENTS, 4), np.float32)
-    colours[..., :3] = radiance(disk, look, spin, radii, rows)[:, None, :]
+    colors = np.ones((RINGS, SEGMENTS, 4), np.float32)
+    colors[..., :3] = radiance(disk, look, spin, radii, rows)[:, None, :]
     attribute = mesh.attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "POINT")
-    attribute.data.foreach_set("color", colours.ravel())
+    attribute.data.foreach_set("color", colors.ravel())
     mesh.update()
 
 

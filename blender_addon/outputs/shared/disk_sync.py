@@ -20,7 +20,7 @@ from . import disk_light
 from .compositor_tree import ROLE, Setup, find_node, find_setup, find_tree
 
 DISK = "disk"
-TABLE_ROLES = {disk_group.COLOURS: "disk_colours", disk_group.TEXTURE: "disk_texture"}
+TABLE_ROLES = {disk_group.COLORS: "disk_colors", disk_group.TEXTURE: "disk_texture"}
 # Nodes that only files have whose group was of version 1.
 FORMER_ROLES = ("disk_profile",)
 SOCKET = "Disk"  # of the group "Umbra Black Hole"
@@ -258,7 +258,7 @@ def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.t
     node.inputs[disk_group.BEAMING].default_value = disk_properties.BEAMINGS[settings.beaming]
     node.inputs[disk_group.PAGE_THORNE].default_value = float(settings.profile != "power_law")
     images = {
-        disk_group.COLOURS: disk_images.ensure_colours(),
+        disk_group.COLORS: disk_images.ensure_colors(),
         disk_group.TEXTURE: settings.texture or disk_images.ensure_texture(),
     }
     for name, image in images.items():

@@ -2,7 +2,7 @@
 """Put a lensed copy of a scene's World in its place, and the World itself back.
 
 The artist's World is never touched, so that what comes back is exactly what was there. The copy keeps all of its
-nodes: the group's Vector takes the place of Generated coordinates, and each Background's colour passes by the group's
+nodes: the group's Vector takes the place of Generated coordinates, and each Background's color passes by the group's
 Tint and Fault.
 """
 
@@ -190,16 +190,16 @@ def _insert(world: bpy.types.World) -> bpy.types.Node:
 
 
 def _tint(tree: bpy.types.NodeTree, background: bpy.types.Node, group: bpy.types.Node) -> None:
-    """Let a Background's colour pass by the group's Tint and Fault."""
-    colour = background.inputs["Color"]
+    """Let a Background's color pass by the group's Tint and Fault."""
+    color = background.inputs["Color"]
     tint = tree.nodes.new("ShaderNodeVectorMath")
     tint.operation = "MULTIPLY_ADD"
     tint.name = tint.label = "Umbra Tint"
     tint.location = (background.location.x - 60.0, background.location.y - 180.0)
-    if colour.is_linked:
-        tree.links.new(colour.links[0].from_socket, tint.inputs[0])
+    if color.is_linked:
+        tree.links.new(color.links[0].from_socket, tint.inputs[0])
     else:
-        tint.inputs[0].default_value = tuple(colour.default_value)[:3]
+        tint.inputs[0].default_value = tuple(color.default_value)[:3]
     tree.links.new(group.outputs[world_group.TINT.name], tint.inputs[1])
     tree.links.new(group.outputs[world_group.FAULT.name], tint.inputs[2])
-    tree.links.new(tint.outputs["Vector"], colour)
+    tree.links.new(tint.outputs["Vector"], color)

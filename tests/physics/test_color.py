@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of shifted light against Planck's law in SI units and against the CIE's spectral locus."""
+"""The color of shifted light against Planck's law in SI units and against the CIE's spectral locus."""
 
 import numpy as np
 import pytest
@@ -38,14 +38,14 @@ def test_intensity_over_all_frequencies_falls_with_the_fourth_power(shift: float
     before = planck_by_frequency(frequency, DEFAULT_TEMPERATURE).sum() * step
     after = (planck_by_frequency(shift * frequency, DEFAULT_TEMPERATURE) / shift**3).sum() * step
     assert after / before == pytest.approx(shift**-4.0, rel=1e-4)
-    brightness_alone = redshift_gain(shift, colour_amount=0.0)
+    brightness_alone = redshift_gain(shift, color_amount=0.0)
     np.testing.assert_allclose(brightness_alone, shift**-4.0, rtol=1e-13)
 
 
 def test_amounts_are_exponents_of_the_two_parts() -> None:
-    colour_alone = redshift_gain(SHIFTS, 1.0, 0.0)
+    color_alone = redshift_gain(SHIFTS, 1.0, 0.0)
     brightness_alone = redshift_gain(SHIFTS, 0.0, 1.0)
-    np.testing.assert_allclose(redshift_gain(SHIFTS, 0.3, 0.7), colour_alone**0.3 * brightness_alone**0.7, rtol=1e-12)
+    np.testing.assert_allclose(redshift_gain(SHIFTS, 0.3, 0.7), color_alone**0.3 * brightness_alone**0.7, rtol=1e-12)
     np.testing.assert_array_equal(redshift_gain(SHIFTS, 0.0, 0.0), np.ones((len(SHIFTS), 3)))
 
 
@@ -67,15 +67,15 @@ def test_hot_sky_brightens_in_proportion_to_its_temperature() -> None:
 
 @pytest.mark.parametrize("shift", [1e-6, 1e6])
 def test_extreme_shifts_do_not_overflow(shift: float) -> None:
-    for colour, brightness in ((1.0, 1.0), (0.5, 1.0), (1.0, 0.0), (0.01, 0.01)):
-        assert np.all(np.isfinite(redshift_gain(shift, colour, brightness)))
+    for color, brightness in ((1.0, 1.0), (0.5, 1.0), (1.0, 0.0), (0.01, 0.01)):
+        assert np.all(np.isfinite(redshift_gain(shift, color, brightness)))
 
 
 def test_second_radiation_constant() -> None:
     assert pytest.approx(PLANCK * LIGHT_SPEED / BOLTZMANN, rel=1e-10) == SECOND_RADIATION_CONSTANT
 
 
-# CIE 1931 chromaticities (x, y) of monochromatic light at two neighbouring wavelengths (nm), and the primary between.
+# CIE 1931 chromaticities (x, y) of monochromatic light at two neighboring wavelengths (nm), and the primary between.
 LOCUS = [
     (610.0, (0.6658, 0.3340), 615.0, (0.6801, 0.3197), (0.64, 0.33)),
     (545.0, (0.2658, 0.7243), 550.0, (0.3016, 0.6923), (0.30, 0.60)),
