@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The maps of a shot as files: listed, verified and cleaned, from the window and from the command line alike.
 
-Like baking, this is a generator that holds names instead of Blender's data. See `baking`.
+Like baking, these are generators that hold none of Blender's data. See `baking`.
 """
 
 import os
@@ -14,14 +14,10 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import SceneError
-from ..core.physics_api import map_check, physics
-from ..scene import frame_setup
-from . import baking, claim, maps
-
-State = map_check.State
-
-# What a bake would replace.
-FAULTY = (State.STALE, State.FOREIGN, State.DAMAGED)
+from . import baking, claim
+from . import folder as map_folder
+from .check import FAULTY, State, check
+from .request import MapRequest, kind_of, name_pattern
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,7 @@ class FrameState:
 
     frame: int
     path: Path
-    state: map_check.State
+    state: State
     fault: str
     size: int
     """Bytes."""
@@ -115,11 +111,8 @@ class FolderNames:
     """The names in a map folder that are those of one scene's hole."""
 
     def __init__(self, scene: bpy.types.Scene, hole_name: str) -> None:
-        self.folder = maps.folder(scene).path
-        self._pattern = re.compile(
-            re.escape(maps.names_of(scene, hole_name))
-            + r"_(?P<size>\d+x\d+)_(?:disk(?P<crossing>\d+)_|world_)?(?P<number>\d{4,7})(?P<exit>_exit_[0-9a-f]+)?\.exr"
-        )
+        self.folder = map_folder.folder(scene).path
+        self._pattern = name_pattern(scene, hole_name)
         self.maps: list[tuple[str, Path]] = []
         """Maps and passes, of whatever size and frame, and the maps that they belong to."""
         self._by_frame: dict[tuple[str, int], list[re.Match[str]]] = {}
@@ -128,7 +121,7 @@ class FolderNames:
         except FileNotFoundError:
             names = []
         except OSError as error:
-            raise maps.explain_reading(error, self.folder) from error
+            raise map_folder.explain_reading(error, self.folder) from error
         for name in names:
             match = self._pattern.fullmatch(name)
             if match is not None:
@@ -136,7 +129,7 @@ class FolderNames:
                 self._by_frame.setdefault((match["size"], int(match["number"])), []).append(match)
         self.leftovers = [
             (path, self._owner(match))
-            for target, halves in maps.half_files(self.folder).items()
+            for target, halves in map_folder.half_files(self.folder).items()
             if (match := self._pattern.fullmatch(target))
             for path in halves
         ] + [
@@ -151,95 +144,90 @@ class FolderNames:
         crossing = f"_disk{match['crossing']}_"
         return self.folder / match.string.replace(crossing, "_", 1 if match["crossing"] else 0)
 
-    def superseded(self, path: Path, parameters: "physics.WarpMapParameters") -> tuple[Path, ...]:
-        """Files of the same frame, size and kind beside a map that are not its own."""
-        if maps.kind_of(path) is maps.WORLD_MAP:
+    def superseded(self, wanted: MapRequest) -> tuple[Path, ...]:
+        """Files of the same frame, size and kind that the request has no use for: older maps, and passes too many."""
+        match = self._pattern.fullmatch(wanted.path.name)
+        if match is None:
             return ()
-        match = self._pattern.fullmatch(path.name)
         others = self._by_frame.get((match["size"], int(match["number"])), ())
-        own = {path.name, *(each.name for each in maps.pass_paths(path, parameters))}
-        lensed = match["exit"] is not None
+        own = {each.name for each in wanted.files}
         return tuple(
             self.folder / each.string
             for each in others
-            if each.string not in own and (each["exit"] is not None if lensed else each["crossing"] is not None)
+            if each.string not in own
+            and kind_of(each) is wanted.kind
+            and (wanted.kind.is_hashed or each["crossing"] is not None)
         )
 
 
 def examine(
-    scene_name: str, frames: Iterable[int], view_layer_name: str | None = None, *, thorough: bool = True
+    frames: Iterable[int], requests_at: baking.RequestsAt, names: FolderNames, *, thorough: bool = True
 ) -> Generator[baking.Progress, None, Listing]:
-    """Find out what the map of each frame is. Nothing is changed; the scene stands at its own frame.
+    """Find out what the map of each frame is. Nothing is changed.
 
     Parameters
     ----------
-    scene_name : str
-        The scene.
     frames : iterable of int
         The frames to list.
-    view_layer_name : str, optional
-        The view layer whose objects count, as for baking.
+    requests_at : callable
+        Returns the requests of a frame.
+    names : FolderNames
+        The names in the folder.
     thorough : bool
-        Read each file whole and check it; otherwise headers are taken at their word.
+        Read each file whole and check it; otherwise headers are trusted.
 
     Raises
     ------
     physics.BlackHoleError
-        The scene is gone, or a frame is impossible; the sentence names it.
+        If the scene is gone, or a frame is impossible; the sentence names it.
     """
     wanted = list(frames)
-    scene = scene_named(scene_name)
-    names = FolderNames(scene, frame_setup.active_hole(scene).name)
     claims = claim.Claims()
     listing = Listing(names.folder, leftovers=[path for path, owner in names.leftovers if not claims.is_taken(owner)])
     for index, frame in enumerate(wanted):
         yield baking.Progress(frame, index / len(wanted), f"Frame {frame} ({index + 1} of {len(wanted)})")
         with baking.naming(frame, len(wanted)):
-            needed = baking.maps_at(scene_named(scene_name), frame, view_layer_name)
+            needed = requests_at(frame)
         if needed:
             listing.frames.append(_state(frame, needed, names, claims, thorough))
     return listing
 
 
 def _state(
-    frame: int,
-    needed: "list[tuple[Path, physics.WarpMapParameters]]",
-    names: FolderNames,
-    claims: claim.Claims,
-    thorough: bool,
+    frame: int, needed: list[MapRequest], names: FolderNames, claims: claim.Claims, thorough: bool
 ) -> FrameState:
-    """What the maps of a frame are; with several, the state is that of the first which does not hold."""
-    found = [(path, maps.check(path, parameters, thorough=thorough)) for path, parameters in needed]
-    path, worst = next((each for each in found if each[1].state is not State.VALID), found[0])
-    files = [each for path, parameters in needed for each in (path, *maps.pass_paths(path, parameters))]
+    """What the maps of a frame are; with several, the state is that of the first which is not valid."""
+    found = [(wanted, check(wanted, thorough=thorough)) for wanted in needed]
+    first, worst = next((each for each in found if each[1].state is not State.VALID), found[0])
+    files = [each for wanted in needed for each in wanted.files]
     own = {each.name for each in files}
-    superseded = {each for one in needed for each in names.superseded(*one) if each.name not in own}
-    taken = worst.state is not State.VALID and claims.is_taken(path)
+    superseded = {each for one in needed for each in names.superseded(one) if each.name not in own}
+    taken = worst.state is not State.VALID and claims.is_taken(first.path)
     return FrameState(
         frame,
-        path,
+        first.path,
         worst.state,
         worst.fault,
         sum(_size(each) for each in files),
         tuple(sorted(superseded)),
-        claims.holder(path) if taken else None,
-        tuple((each, one.fault) for each, one in found if one.state in FAULTY),
+        claims.holder(first.path) if taken else None,
+        tuple((each.path, one.fault) for each, one in found if one.state in FAULTY),
     )
 
 
 def clean(
-    scene_name: str,
     frames: Iterable[int],
-    view_layer_name: str | None = None,
+    requests_at: baking.RequestsAt,
+    names: FolderNames,
     *,
     everything: bool = False,
     dry_run: bool = False,
 ) -> Generator[baking.Progress, None, Cleaning]:
-    """Remove the maps of some frames that are stale, foreign or damaged, and half files of processes that were killed.
+    """Remove the maps of some frames that are stale, foreign or damaged, and half files of killed processes.
 
     Parameters
     ----------
-    scene_name, frames, view_layer_name
+    frames, requests_at, names
         As for `examine`.
     everything : bool
         Remove all maps of the scene's hole instead, valid ones too, of every frame, size and output.
@@ -249,16 +237,15 @@ def clean(
     Raises
     ------
     physics.BlackHoleError
-        As `examine` does; or a file cannot be removed.
+        As `examine` does; or if a file cannot be removed.
     """
-    scene = scene_named(scene_name)
-    names = FolderNames(scene, frame_setup.active_hole(scene).name)
+    wanted = list(frames)
     doomed: list[tuple[Path, Path, str]] = []
     if everything:
-        yield baking.Progress(scene.frame_current, 0.0, "Cleaning")
+        yield baking.Progress(wanted[0] if wanted else 0, 0.0, "Cleaning")
         doomed += [(names.folder / each, owner, "every map was to be removed") for each, owner in names.maps]
     else:
-        listing = yield from examine(scene_name, frames, view_layer_name)
+        listing = yield from examine(wanted, requests_at, names)
         for each in listing.frames:
             doomed += [(path, path, fault) for path, fault in each.faulty]
             doomed += [(path, each.path, f"{path} is out of date") for path in each.superseded]
@@ -282,24 +269,9 @@ def _remove(doomed: list[tuple[Path, Path, str]], dry_run: bool) -> Cleaning:
                     path.unlink(missing_ok=True)
                     claims.release(owner)
             except OSError as error:
-                raise maps.explain(error, path.parent) from error
+                raise map_folder.explain(error, path.parent) from error
             cleaning.removed.append(removal)
     return cleaning
-
-
-def scene_named(name: str) -> bpy.types.Scene:
-    """The scene of a name.
-
-    Raises
-    ------
-    SceneError
-        There is none; the sentence says which there are.
-    """
-    scene = bpy.data.scenes.get(name)
-    if scene is None:
-        names = ", ".join(f'"{each.name}"' for each in bpy.data.scenes)
-        raise SceneError(f'There is no scene "{name}" in this file: its scenes are {names}.')
-    return scene
 
 
 def _size(path: Path) -> int:

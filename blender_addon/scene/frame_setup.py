@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..core.errors import SceneError
 from ..core.physics_api import physics
-from ..outputs.lens.lens_camera import original_type
 from ..settings.disk_properties import disk_of
-from ..settings.properties import CAMERA_ANIMATION, COMPOSITOR, MOTIONS, WORLD, tolerances_of
+from ..settings.properties import CAMERA_ANIMATION, MOTIONS, tolerances_of
+from .camera_type import original_type
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -29,8 +29,21 @@ Rows = tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True)
-class Shot:
-    """Everything that makes the warp map of one frame."""
+class Traits:
+    """What an output can do with cameras and render settings; the defaults are those of a picture made of maps."""
+
+    crops: bool = False
+    """Whether Crop to Render Region is supported."""
+    any_camera: bool = False
+    """Whether the map is looked up by direction, so that the camera's lens does not matter."""
+
+
+PLAIN = Traits()
+
+
+@dataclass(frozen=True)
+class FrameSetup:
+    """Everything that makes the maps of one frame."""
 
     frame: int
     hole_name: str
@@ -209,15 +222,15 @@ def render_size(render: bpy.types.RenderSettings) -> tuple[int, int]:
     )
 
 
-def check_render(render: bpy.types.RenderSettings, *, bends_rays: bool = False) -> None:
-    """Refuse render settings for which the map would not fit the picture; a camera that bends its rays takes a crop.
+def check_render(render: bpy.types.RenderSettings, traits: Traits = PLAIN) -> None:
+    """Refuse render settings for which the map would not fit the picture.
 
     Raises
     ------
     SceneError
         Crop to Render Region, or Stereoscopy.
     """
-    if render.use_border and render.use_crop_to_border and not bends_rays:
+    if render.use_border and render.use_crop_to_border and not traits.crops:
         raise SceneError(
             "Crop to Render Region is not supported with a black hole in the compositor: switch it off in Output "
             "Properties > Format (the render region itself works), or choose Output: Cycles Lens."
@@ -236,9 +249,9 @@ def _panorama_setting(camera: bpy.types.Camera, name: str) -> object:
 
 
 def camera_model(
-    camera: bpy.types.Camera, render: bpy.types.RenderSettings, engine: str, *, world_output: bool = False
+    camera: bpy.types.Camera, render: bpy.types.RenderSettings, engine: str, traits: Traits = PLAIN
 ) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
-    """The physics' camera for a Blender camera's (evaluated) settings; for the World output any stands for all.
+    """Return the physics' camera for a Blender camera's (evaluated) settings.
 
     Raises
     ------
@@ -247,7 +260,7 @@ def camera_model(
     """
     width, height = render_size(render)
     kind_of_lens = original_type(camera)
-    if world_output and kind_of_lens != "ORTHO":
+    if traits.any_camera and kind_of_lens != "ORTHO":
         return physics.PanoramaCamera(width, height)  # the World is looked up by direction, whatever the lens
     if kind_of_lens == "PERSP":
         return physics.PerspectiveCamera(
@@ -300,8 +313,13 @@ def _rows(matrix: Matrix) -> Rows:
     return tuple(tuple(float(value) for value in row) for row in matrix)
 
 
-def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vector | None = None) -> Shot:
-    """The shot of the frame at which the dependency graph stands.
+def read(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    velocity: Vector | None = None,
+    traits: Traits = PLAIN,
+) -> FrameSetup:
+    """Return the setup of the frame at which the dependency graph stands.
 
     Parameters
     ----------
@@ -312,13 +330,15 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     velocity : array, shape (3,), optional
         The camera's velocity, scene units a second, world axes, for the motion Camera Animation. Without it,
         it is measured, which steps the scene half a frame back and forth.
+    traits : Traits
+        What the scene's output can do.
 
     Raises
     ------
     physics.BlackHoleError
         Whatever makes the frame impossible, as one sentence for the artist.
     """
-    check_render(scene.render, bends_rays=scene.umbra.output != COMPOSITOR)
+    check_render(scene.render, traits)
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
     camera = scene.camera
@@ -351,9 +371,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     position = world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m
     parameters = physics.WarpMapParameters(
         spin=float(hole_settings.spin),
-        camera=camera_model(
-            evaluated_camera.data, scene.render, scene.render.engine, world_output=settings.output == WORLD
-        ),
+        camera=camera_model(evaluated_camera.data, scene.render, scene.render.engine, traits),
         camera_position=tuple(float(value) for value in position),
         camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
         hole_to_world=_rows(hole_pose.rotation),
@@ -368,11 +386,13 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Vecto
     parameters.validate()
     data = evaluated_camera.data
     shift = (data.shift_x, data.shift_y)
-    return Shot(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data))
+    return FrameSetup(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data))
 
 
-def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> Shot:
-    """The shot of any frame; the scene is back at its current frame afterwards.
+def read_at(
+    scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None, traits: Traits = PLAIN
+) -> FrameSetup:
+    """Return the setup of any frame; the scene is back at its current frame afterwards.
 
     Parameters
     ----------
@@ -382,6 +402,8 @@ def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer 
         The frame to read.
     view_layer : ViewLayer, optional
         The layer whose objects count; the first that is rendered by default.
+    traits : Traits
+        What the scene's output can do.
 
     Raises
     ------
@@ -391,4 +413,9 @@ def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer 
     layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
     with _frame_kept(scene):
         scene.frame_set(frame)
-        return read(scene, layer.depsgraph)
+        return read(scene, layer.depsgraph, traits=traits)
+
+
+def frames_of(scene: bpy.types.Scene) -> range:
+    """Return the frames that rendering the scene's animation renders."""
+    return range(scene.frame_start, scene.frame_end + 1, max(scene.frame_step, 1))

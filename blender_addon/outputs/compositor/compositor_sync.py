@@ -11,8 +11,6 @@ from ..shared import disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
-# A file that never exists: a frame without a valid map is magenta instead of showing some older map.
-NO_MAP = "no_warp_map_0001.exr"
 
 ROTATION_SOCKET, STRENGTH_SOCKET = "Environment Rotation", "Environment Strength"
 
@@ -54,26 +52,6 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
             notes.append(str(error))
 
 
-# Together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see maps.py.
-SEQUENCE_SETTINGS = {
-    "frame_duration": maps.SEQUENCE_LENGTH,
-    "frame_start": 0,
-    "frame_offset": -1,
-    "use_cyclic": True,
-    "use_auto_refresh": True,
-}
-
-
-def map_image(name: str) -> bpy.types.Image:
-    """An image datablock that reads maps, as yet none."""
-    image = bpy.data.images.new(name, 1, 1, float_buffer=True)
-    image.source = "SEQUENCE"
-    image.filepath = NO_MAP
-    image.colorspace_settings.name = "Non-Color"
-    image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
-    return image
-
-
 def point_at_maps(scene: bpy.types.Scene) -> None:
     """Let the map node read the scene's maps of the current resolution.
 
@@ -107,23 +85,6 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
         return
     read_sequence(setup.map, MAP_IMAGE_NAME, path)
     point_passes(setup.tree, path)
-
-
-def point_passes(tree: bpy.types.NodeTree, path: str) -> None:
-    """Let the disk's passes be read from beside a map."""
-    for node, crossing in disk_sync.passes_of(tree):
-        read_sequence(node, f"Umbra Disk Pass {crossing}", maps.pass_path(path, crossing))
-
-
-def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
-    """Let an image node read one file for each frame."""
-    if node.image is None or node.image.source != "SEQUENCE":
-        node.image = map_image(name)
-    for name, value in SEQUENCE_SETTINGS.items():
-        if getattr(node, name) != value:
-            setattr(node, name, value)
-    if node.image.filepath != path:
-        node.image.filepath = path
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:

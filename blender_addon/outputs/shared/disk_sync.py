@@ -15,7 +15,6 @@ from ...core.physics_api import disk_flux, disk_texture, metric, orbiting_matter
 from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
-from ...settings.properties import CYCLES_LENS
 from . import disk_light
 from .compositor_tree import ROLE, Setup, find_node, find_setup, find_tree
 
@@ -31,63 +30,24 @@ def pass_role(number: int) -> str:
     return f"disk_pass_{number}"
 
 
-def refresh_hole(hole: bpy.types.Object) -> None:
-    """Carry a change of a hole's settings into all scenes that render it."""
-    for scene in bpy.data.scenes:
-        if isinstance(hole, bpy.types.Object) and frame_setup.find_active_hole(scene) == hole:
-            refresh_or_warn(scene)
-
-
-def refresh_or_warn(scene: bpy.types.Scene) -> None:
-    """The same as `refresh` where nobody could be told by an error."""
-    try:
-        refresh(scene)
-    except SceneError as error:
-        messages.warn(str(error))
-
-
-def refresh(scene: bpy.types.Scene) -> None:
-    """Put the disk's nodes into the scene's compositor, bring them up to date, or take them out.
-
-    Raises
-    ------
-    SceneError
-        The output is the Cycles Lens, and the compositor tree belongs to another file or scene.
-    """
-    from ..lens import lens_disk  # it calls this module
-
+def wanted_hole(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the scene's hole if its disk is switched on."""
     hole = frame_setup.find_active_hole(scene)
-    disk_light.refresh(scene, hole)
-    setup = find_setup(scene)
-    wanted = hole is not None and hole.umbra.disk.enabled
-    if setup is not None:
-        if setup.tree.library is not None:
-            return
-        if not wanted:
-            remove(setup.tree)
-            return
-        node = _put_in(scene, setup)
-    elif scene.umbra.output != CYCLES_LENS or scene.library is not None:
-        return
-    elif wanted:
-        node = lens_disk.put_in(scene)
-    else:
-        lens_disk.take_out(scene)
-        return
+    return hole if hole is not None and hole.umbra.disk.enabled else None
+
+
+def update(scene: bpy.types.Scene, hole: bpy.types.Object, node: bpy.types.Node) -> None:
+    """Carry the disk's settings into its node: values, and drivers where they are animated."""
     tree = node.id_data
     disk = disk_properties.disk_of(hole.umbra.disk)
     try:
         disk.validate(hole.umbra.spin, scene.umbra.method)
     except physics.BlackHoleError:
-        pass  # whoever reads the shot says so
+        pass  # whoever reads the frame reports it
     else:
         _follow_geometry(tree, node, hole, disk)
         _follow_time(tree, node, hole, scene)
     _follow_settings(tree, node, hole)
-    if setup is None:
-        lens_disk.point_at_passes(scene)
-    else:
-        _point_passes(setup)
 
 
 def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
@@ -127,19 +87,6 @@ def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") 
 
 
 # --- nodes ----------------------------------------------------------------------------------------
-
-
-def _put_in(scene: bpy.types.Scene, setup: Setup) -> bpy.types.Node:
-    """The disk's node behind the scene of a set-up with a bent sky."""
-    is_new = find_node(setup.tree, DISK) is None
-    node = ensure_node(scene, setup.tree)
-    if is_new:
-        x, y = setup.group.location
-        node.location = (x - 300, y - 1100)
-        arrange(setup.tree, node)
-    if not setup.group.inputs[SOCKET].is_linked:
-        setup.tree.links.new(node.outputs[disk_group.OUTPUT], setup.group.inputs[SOCKET])
-    return node
 
 
 def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.Node:
@@ -341,12 +288,10 @@ def _drives(curve: bpy.types.FCurve, expression: str, source: tuple[bpy.types.ID
 # --- passes ---------------------------------------------------------------------------------------
 
 
-def _point_passes(setup: Setup) -> None:
-    """Let the passes be read from beside the map that is read."""
-    from ..compositor import compositor_sync  # it calls this module
-
-    if setup.map is not None and setup.map.image is not None:
-        compositor_sync.point_passes(setup.tree, setup.map.image.filepath)
+def point_passes(tree: bpy.types.NodeTree, path: str) -> None:
+    """Let the disk's passes be read from beside a map."""
+    for node, crossing in passes_of(tree):
+        read_sequence(node, f"Umbra Disk Pass {crossing}", pass_path(path, crossing))
 
 
 def passes_of(tree: bpy.types.NodeTree) -> list[tuple[bpy.types.Node, int]]:

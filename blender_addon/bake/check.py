@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether map files are what their requests ask for."""
+
+import os
+
+import bpy
+
+from ..core.physics_api import map_check
+from .folder import folder
+from .request import PASS_FORMAT, SEQUENCE_LENGTH, MapRequest, kind_of, name_pattern, older_maps
+
+State = map_check.State
+
+# What a bake would replace.
+FAULTY = (State.STALE, State.FOREIGN, State.DAMAGED)
+
+
+def check(wanted: MapRequest, *, thorough: bool = True) -> map_check.Finding:
+    """Return what a map is, with its disk's passes: the first thing that is wrong with any of the files.
+
+    Parameters
+    ----------
+    wanted : MapRequest
+        The map.
+    thorough : bool
+        Read and check the pixels too, 0.1 s in full HD; otherwise headers are trusted.
+    """
+    kind = wanted.kind
+    found = map_check.check_map(wanted.path, kind.format, wanted.parameters.hash, thorough=thorough)
+    if found.state is State.MISSING and older_maps(wanted):
+        return map_check.Finding(State.STALE, f"The {kind.noun} {wanted.path} is out of date")
+    for one in wanted.passes:
+        if found.state is not State.VALID:
+            break
+        found = map_check.check_map(one, PASS_FORMAT, wanted.parameters.hash, thorough=thorough)
+    return found
+
+
+def fault_of(wanted: MapRequest, *, thorough: bool = True) -> str | None:
+    """Return what is wrong with a map as the beginning of a sentence, or None if it is valid; see `check`."""
+    return check(wanted, thorough=thorough).fault or None
+
+
+def is_valid(wanted: MapRequest, *, thorough: bool = True) -> bool:
+    """Return whether a map exists and was made from exactly these parameters."""
+    return fault_of(wanted, thorough=thorough) is None
+
+
+def count_baked(scene: bpy.types.Scene, hole_name: str, like: MapRequest, frames: range) -> int:
+    """Return how many of the frames have a map of the same kind and size, up to date or not."""
+    pattern = name_pattern(scene, hole_name)
+    size = "x".join(map(str, like.parameters.map_size))
+    try:
+        with os.scandir(folder(scene).path) as entries:
+            matches = [match for entry in entries if (match := pattern.fullmatch(entry.name))]
+    except OSError:
+        return 0
+    numbers = {
+        int(match["number"])
+        for match in matches
+        if match["size"] == size and match["crossing"] is None and kind_of(match) is like.kind
+    }
+    return sum(frame % SEQUENCE_LENGTH in numbers for frame in frames)

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images that read maps: a file for each frame, or none at all until a valid map is there."""
+
+import bpy
+
+from ...bake.request import SEQUENCE_LENGTH
+
+# A file that never exists: a frame without a valid map is magenta instead of showing some older map.
+NO_MAP = "no_warp_map_0001.exr"
+
+# Together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see bake/request.py.
+SEQUENCE_SETTINGS = {
+    "frame_duration": SEQUENCE_LENGTH,
+    "frame_start": 0,
+    "frame_offset": -1,
+    "use_cyclic": True,
+    "use_auto_refresh": True,
+}
+
+
+def map_image(name: str) -> bpy.types.Image:
+    """An image datablock that reads maps, as yet none."""
+    image = bpy.data.images.new(name, 1, 1, float_buffer=True)
+    image.source = "SEQUENCE"
+    image.filepath = NO_MAP
+    image.colorspace_settings.name = "Non-Color"
+    image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
+    return image
+
+
+def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
+    """Let an image node read one file for each frame."""
+    if node.image is None or node.image.source != "SEQUENCE":
+        node.image = map_image(name)
+    for name, value in SEQUENCE_SETTINGS.items():
+        if getattr(node, name) != value:
+            setattr(node, name, value)
+    if node.image.filepath != path:
+        node.image.filepath = path
+
+
