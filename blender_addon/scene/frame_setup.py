@@ -17,7 +17,8 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..outputs.lens.lens_camera import original_type
 from ..settings.disk_properties import disk_of
-from ..settings.properties import CAMERA_ANIMATION, COMPOSITOR, MOTIONS, WORLD, tolerances_of
+from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
+from ..settings.scene_properties import COMPOSITOR, WORLD, tolerances_of
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.

@@ -15,7 +15,7 @@ from ...core.physics_api import disk_flux, disk_texture, metric, orbiting_matter
 from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
-from ...settings.properties import CYCLES_LENS
+from ...settings.scene_properties import CYCLES_LENS
 from . import disk_light
 from .compositor_tree import ROLE, Setup, find_node, find_setup, find_tree
 
