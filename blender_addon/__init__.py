@@ -9,11 +9,13 @@ import bpy
 from .command import command_line
 from .farm import farm_copy, farm_templates
 from .render import handlers
-from .settings import properties
+from .settings import disk_properties, hole_properties, scene_properties
 from .ui import accuracy_check, cache_panel, disk_panel, operators, panels, preview_panel
 
 _CLASSES = (
-    *properties.CLASSES,
+    *disk_properties.CLASSES,
+    *hole_properties.CLASSES,
+    *scene_properties.CLASSES,
     *operators.CLASSES,
     *panels.CLASSES,
     *disk_panel.CLASSES,
@@ -37,7 +39,7 @@ def register() -> None:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (properties, operators, preview_panel, handlers, command_line):
+        for module in (hole_properties, scene_properties, operators, preview_panel, handlers, command_line):
             module.register()
             _undo.append(module.unregister)
     except BaseException:

@@ -19,7 +19,7 @@ from ..core.physics_api import physics
 from ..outputs.lens import foreground, lens_camera, lens_shader, lens_sync
 from ..outputs.shared import disk_light
 from ..scene import frame_setup
-from ..settings.properties import IN_SHADER
+from ..settings.scene_properties import IN_SHADER
 from ..ui.operators import TIMER_INTERVAL, reporting
 
 SUFFIX = "_farm"

@@ -8,7 +8,7 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..preview import live_preview
 from ..scene import frame_setup
-from ..settings.properties import COMPOSITOR, CYCLES_LENS, WORLD
+from ..settings.scene_properties import COMPOSITOR, CYCLES_LENS, WORLD
 from .compositor import compositing
 from .lens import foreground, lens_camera, lens_disk, lens_shader, lens_sync
 from .shared import disk_sync

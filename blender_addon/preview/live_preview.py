@@ -18,7 +18,7 @@ from ..core.physics_api import physics, world_map
 from ..outputs.lens import lens_sync
 from ..outputs.world import lensed_world, world_sync
 from ..scene import frame_setup
-from ..settings.properties import ACCURACIES
+from ..settings.scene_properties import ACCURACIES
 from . import thumbnail
 
 # Seconds that one slice of work may take, and between two of them.

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
-from ..settings.properties import CAMERA_ANIMATION, MOTIONS, tolerances_of
+from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
+from ..settings.scene_properties import tolerances_of
 from .camera_type import original_type
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from

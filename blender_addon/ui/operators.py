@@ -15,7 +15,8 @@ from ..outputs.lens import foreground, lens_sync
 from ..outputs.shared.compositor_tree import find_setup
 from ..outputs.world import world_sync
 from ..scene import environment, frame_setup
-from ..settings.properties import COMPOSITOR, CYCLES_LENS, DEFAULT_MASS_SCALE, LARGEST_SPIN, WORLD
+from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
+from ..settings.scene_properties import COMPOSITOR, CYCLES_LENS, WORLD
 
 TIMER_INTERVAL = 0.02  # seconds between steps of a bake that runs beside the interface
 

@@ -6,7 +6,8 @@ import bpy
 from ..outputs.lens import lens_disk, lens_sync
 from ..outputs.shared.compositor_tree import find_setup
 from ..scene import frame_setup
-from ..settings.properties import CAMERA_ANIMATION, COMPOSITOR
+from ..settings.hole_properties import CAMERA_ANIMATION
+from ..settings.scene_properties import COMPOSITOR
 from . import operators, status
 from .sidebar import UmbraPanel
 

@@ -16,7 +16,7 @@ from ..outputs.lens import lens_objects, lens_shader, lens_sync
 from ..outputs.shared.compositor_tree import find_setup
 from ..outputs.world import world_sync
 from ..scene import environment, frame_setup
-from ..settings.properties import CAMERA_ANIMATION
+from ..settings.hole_properties import CAMERA_ANIMATION
 
 # How many characters a line of a panel shows: its width less margins and icon, over a character's mean width, in
 # pixels at an interface scale of 1.

@@ -65,6 +65,6 @@ def test_operators_are_described():
 
 def test_what_is_looked_for_is_found():
     assert ("bake", "`--spin") in list(command_line_options())
-    assert ("properties.spin", "Spin") in list(properties())
+    assert ("hole_properties.spin", "Spin") in list(properties())
     assert ("disk_properties.opacity", "Opacity") in list(properties())
     assert ("umbra.bake_frame", "Bake This Frame") in list(operators())

@@ -10,7 +10,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...scene import frame_setup
-from ...settings.properties import COMPOSITOR
+from ...settings.scene_properties import COMPOSITOR
 from ..compositor import compositing
 from ..shared.compositor_tree import ROLE, find_node, find_tree, has_scene_tree
 from . import lens_camera, lens_objects, lens_tree

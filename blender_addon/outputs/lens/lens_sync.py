@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.physics_api import lens, physics
 from ...scene import frame_setup
-from ...settings.properties import CYCLES_LENS, EXIT_MAP
+from ...settings.scene_properties import CYCLES_LENS, EXIT_MAP
 from . import lens_camera, lens_shader
 
 # The first version whose Cycles counts a texture's rows from the bottom.

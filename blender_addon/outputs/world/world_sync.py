@@ -11,7 +11,7 @@ from ...core.physics_api import physics, world_map
 from ...nodes import world_group
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
-from ...settings.properties import WORLD
+from ...settings.scene_properties import WORLD
 from ..compositor import compositor_sync
 from . import lensed_world
 

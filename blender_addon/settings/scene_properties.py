@@ -1,31 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the artist sets and Blender saves: the hole on its object, the rendering of it on the scene."""
+"""How a scene's black hole is rendered: `scene.umbra`."""
 
 import bpy
 
-from ..core.physics_api import color, lens, metric, physics
-from . import disk_properties
-
-# physics accepts spins up to this; a hole spinning the other way is the object turned over.
-LARGEST_SPIN = 0.9999
-
-# With Blender's default camera, the shadow then fills most of the picture's height.
-DEFAULT_MASS_SCALE = 0.35
-
-# Blender draws Empties no smaller (scene units).
-SMALLEST_DISPLAY = 1e-4
-
-CAMERA_ANIMATION = "CAMERA_ANIMATION"
-
-# Identifiers are saved in files: Blender's enum -> the physics' name of the same motion.
-MOTIONS = {
-    "FIDO": "fido",
-    "STATIC": "static",
-    "CIRCULAR": "circular",
-    "CIRCULAR_RETROGRADE": "circular_retrograde",
-    "FREE_FALL": "free_fall",
-    CAMERA_ANIMATION: "velocity",
-}
+from ..core.physics_api import color, lens, physics
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
 ACCURACIES = {
@@ -40,98 +18,6 @@ EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
 # Blender saves an enum's number, so a method keeps the one it has here.
 METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
-
-
-def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
-    """Draw the Empty's sphere at the size of the horizon.
-
-    Every property has this as its update function, also where the sphere stays the same: without one, Blender
-    does not carry a script's new value into evaluated data.
-    """
-    hole = settings.id_data
-    if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
-        hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
-    if settings.disk.enabled:  # its innermost orbit depends on the spin, and its light on the size
-        from ..outputs.shared import disk_sync  # it reads these properties, hence not at the top
-
-        disk_sync.refresh_hole(hole)
-
-
-class UmbraHoleProperties(bpy.types.PropertyGroup):
-    """A black hole. Its place, axis (local Z) and size are those of the object."""
-
-    is_black_hole: bpy.props.BoolProperty(
-        name="Black Hole",
-        description="This object is a black hole: its origin is the center, its local Z the axis of rotation",
-        default=False,
-        update=_changed,
-        options=set(),
-    )
-    spin: bpy.props.FloatProperty(
-        name="Spin",
-        description="How fast the hole rotates: 0 does not rotate, 1 would be the fastest possible. "
-        "The shadow is flattened on the side that turns towards the camera",
-        default=0.9,
-        min=0.0,
-        max=LARGEST_SPIN,
-        precision=4,
-        step=1,
-        update=_changed,
-    )
-    mass_scale: bpy.props.FloatProperty(
-        name="Size of 1 M",
-        description="Length of one gravitational radius (G M / c^2) in scene units, before the object's own "
-        "scale. The shadow is about ten of these across",
-        default=DEFAULT_MASS_SCALE,
-        min=1e-9,
-        soft_min=0.001,
-        soft_max=100.0,
-        precision=4,
-        unit="LENGTH",
-        update=_changed,
-    )
-    motion: bpy.props.EnumProperty(
-        name="Camera Motion",
-        description="How the camera moves: this shifts directions (aberration) and colors (Doppler effect)",
-        items=(
-            (
-                "FIDO",
-                "Carried by Space",
-                "Held in place, and carried round by the hole's rotation (the local fiducial observer)",
-            ),
-            ("STATIC", "At Rest", "At rest against the stars; impossible inside the ergosphere"),
-            (
-                "CIRCULAR",
-                "Circular Orbit",
-                "Abreast of the circular orbit of the same radius that runs with the hole's rotation",
-            ),
-            (
-                "CIRCULAR_RETROGRADE",
-                "Circular Orbit, Retrograde",
-                "Abreast of the circular orbit of the same radius that runs against the hole's rotation",
-            ),
-            ("FREE_FALL", "Free Fall", "Falling in, from rest at infinity"),
-            (
-                CAMERA_ANIMATION,
-                "Camera Animation",
-                "As the camera's own animation moves it in the scene, "
-                "measured at each frame against the speed of light set below",
-            ),
-        ),
-        default="FIDO",
-        update=_changed,
-    )
-    speed_of_light: bpy.props.FloatProperty(
-        name="Speed of Light",
-        description="Scene units that light covers in a second; the camera's speed is measured against it",
-        default=100.0,
-        min=1e-6,
-        soft_min=0.1,
-        soft_max=1e5,
-        precision=3,
-        update=_changed,
-    )
-    disk: bpy.props.PointerProperty(type=disk_properties.UmbraDiskProperties)
 
 
 def _is_hole(_settings: object, candidate: bpy.types.Object) -> bool:
@@ -369,16 +255,14 @@ def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:
     return ACCURACIES.get(settings.quality, (settings.tolerance, settings.interpolation))
 
 
-CLASSES = (*disk_properties.CLASSES, UmbraHoleProperties, UmbraSceneProperties)
+CLASSES = (UmbraSceneProperties,)
 
 
 def register() -> None:
-    """Attach the properties to objects and scenes."""
-    bpy.types.Object.umbra = bpy.props.PointerProperty(type=UmbraHoleProperties)
+    """Attach the properties to scenes."""
     bpy.types.Scene.umbra = bpy.props.PointerProperty(type=UmbraSceneProperties)
 
 
 def unregister() -> None:
-    """Take the properties off again; their values stay in the file."""
+    """Detach the properties; their values stay in the file."""
     del bpy.types.Scene.umbra
-    del bpy.types.Object.umbra
