@@ -7,16 +7,20 @@ from collections.abc import Callable
 import bpy
 
 from .command import command_line
+from .core.session import SESSION, Life
 from .farm import farm_copy, farm_templates
+from .outputs import registration as outputs
+from .preview import live_preview
 from .render import handlers
 from .settings import disk_properties, hole_properties, scene_properties
-from .ui import accuracy_check, cache_panel, disk_panel, operators, panels, preview_panel
+from .ui import accuracy_check, bake_operators, cache_panel, disk_panel, operators, panels, preview_panel
 
 _CLASSES = (
     *disk_properties.CLASSES,
     *hole_properties.CLASSES,
     *scene_properties.CLASSES,
     *operators.CLASSES,
+    *bake_operators.CLASSES,
     *panels.CLASSES,
     *disk_panel.CLASSES,
     *cache_panel.CLASSES,
@@ -24,6 +28,18 @@ _CLASSES = (
     *farm_templates.CLASSES,
     *accuracy_check.CLASSES,
     *preview_panel.CLASSES,
+)
+
+# Each has a function `register` and one that undoes it.
+_MODULES = (
+    hole_properties,
+    scene_properties,
+    outputs,
+    live_preview,
+    operators,
+    preview_panel,
+    handlers,
+    command_line,
 )
 
 # What was registered, undone in reverse order. A registration that fails half-way undoes what it did and then
@@ -35,11 +51,12 @@ def register() -> None:
     """Register the add-on with Blender."""
     if _undo:
         raise RuntimeError("Umbra Black Hole is registered already.")
+    _undo.append(lambda: SESSION.end(Life.REGISTRATION))
     try:
         for each in _CLASSES:
             bpy.utils.register_class(each)
             _undo.append(lambda each=each: bpy.utils.unregister_class(each))
-        for module in (hole_properties, scene_properties, operators, preview_panel, handlers, command_line):
+        for module in _MODULES:
             module.register()
             _undo.append(module.unregister)
     except BaseException:

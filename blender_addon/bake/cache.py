@@ -13,7 +13,6 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import SceneError
 from . import baking, claim
 from . import folder as map_folder
 from .check import FAULTY, State, check

@@ -189,7 +189,9 @@ def older_maps(wanted: MapRequest) -> list[Path]:
     beginning = name[: name.rindex(mark) + len(mark)]
     parent = wanted.path.parent
     others = parent.iterdir() if parent.is_dir() else ()
-    return [each for each in others if each.name.startswith(beginning) and each.suffix == ".exr" and each != wanted.path]
+    return [
+        each for each in others if each.name.startswith(beginning) and each.suffix == ".exr" and each != wanted.path
+    ]
 
 
 def name_pattern(scene: bpy.types.Scene, hole_name: str) -> re.Pattern[str]:
@@ -209,7 +211,5 @@ def name_pattern(scene: bpy.types.Scene, hole_name: str) -> re.Pattern[str]:
 def kind_of(match: re.Match[str]) -> MapKind:
     """Return the kind of map that a match of `name_pattern` names; a pass is part of its map."""
     return next(
-        kind
-        for kind in KINDS
-        if kind.mark == (match["mark"] or "") and kind.is_hashed == (match["hash"] is not None)
+        kind for kind in KINDS if kind.mark == (match["mark"] or "") and kind.is_hashed == (match["hash"] is not None)
     )

@@ -12,17 +12,26 @@ from typing import TextIO, TypeVar
 
 import bpy
 
-from ..bake import baking, cache, frame_list, maps
+from ..bake import baking, check, frame_list
+from ..bake.folder import folder
 from ..core import stopping
 from ..core.errors import MapFolderError, SceneError
 from ..core.physics_api import physics
+from ..core.session import SESSION, Life
+from ..outputs import frames as frame_maps
+from ..outputs import registry
 from ..scene import frame_setup
 
 NAME = "umbra"
 
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
 
-_handle: object = None
+
+def _no_handle() -> object:
+    return None
+
+
+_handle = SESSION.value(_no_handle, Life.REGISTRATION)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -89,7 +98,7 @@ Result = TypeVar("Result")
 
 def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
     frame_setup.active_hole(scene)
-    if not baking.needs_maps(scene):
+    if not registry.of(scene).needs_maps(scene):
         out.line("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         return DONE, {"command": "bake", "baked": 0, "kept": 0, "unresolved": 0}
     words = {baking.BAKED: "baked", baking.KEPT: "still valid"}
@@ -99,7 +108,7 @@ def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int]
             out.line(f"{progress.fraction:4.0%}  {progress.text}: {words[progress.outcome]}")
             out.event("frame", frame=progress.frame, outcome=progress.outcome, progress=round(progress.fraction, 4))
 
-    summary = _drain(baking.bake_frames(scene.name, frames, options.view_layer), tell, out)
+    summary = _drain(frame_maps.bake(scene, frames, options.view_layer), tell, out)
     out.line(summary.sentence())
     if summary.unresolved:
         out.line(f"{summary.unresolved} rays could not be resolved; choose another Method under Warp Maps.")
@@ -108,15 +117,15 @@ def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int]
         "baked": len(summary.baked),
         "kept": len(summary.reused),
         "unresolved": summary.unresolved,
-        "folder": str(maps.folder(scene).path),
+        "folder": str(folder(scene).path),
     }
 
 
 def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
-    steps = cache.examine(scene.name, frames, options.view_layer, thorough=not options.quick)
+    steps = frame_maps.examine(scene, frames, options.view_layer, thorough=not options.quick)
     listing = _drain(steps, _tenths(out, "checking"), out)
     for each in listing.frames:
-        note = f"  {each.fault}" if each.state in cache.FAULTY else ""
+        note = f"  {each.fault}" if each.state in check.FAULTY else ""
         note += f"  {each.baker} is baking it" if each.baker else ""
         out.line(f"{each.frame:7d}  {each.state:<8}{each.size / 1e6:9.1f} MB{note}")
         out.event(
@@ -139,7 +148,7 @@ def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[in
 
 
 def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int], out: Output) -> Outcome:
-    steps = cache.clean(scene.name, frames, options.view_layer, everything=options.all, dry_run=options.dry_run)
+    steps = frame_maps.clean(scene, frames, options.view_layer, everything=options.all, dry_run=options.dry_run)
     cleaning = _drain(steps, _tenths(out, "checking"), out)
     for each in cleaning.removed:
         out.line(f"{'would remove' if options.dry_run else 'removed'} {each.path.name} ({each.reason})")
@@ -151,7 +160,7 @@ def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int
         "files": len(cleaning.removed),
         "bytes": cleaning.size,
         "in_use": [str(each) for each in cleaning.in_use],
-        "folder": str(maps.folder(scene).path),
+        "folder": str(folder(scene).path),
     }
 
 
@@ -184,8 +193,23 @@ def _tenths(out: Output, verb: str) -> Callable[[baking.Progress], None]:
     return tell
 
 
+def scene_named(name: str) -> bpy.types.Scene:
+    """The scene of a name.
+
+    Raises
+    ------
+    SceneError
+        There is none; the sentence says which there are.
+    """
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        names = ", ".join(f'"{each.name}"' for each in bpy.data.scenes)
+        raise SceneError(f'There is no scene "{name}" in this file: its scenes are {names}.')
+    return scene
+
+
 def _scene_of(options: argparse.Namespace) -> bpy.types.Scene:
-    return bpy.context.scene if options.scene is None else cache.scene_named(options.scene)
+    return bpy.context.scene if options.scene is None else scene_named(options.scene)
 
 
 def _frames_of(options: argparse.Namespace, scene: bpy.types.Scene) -> list[int]:
@@ -194,7 +218,7 @@ def _frames_of(options: argparse.Namespace, scene: bpy.types.Scene) -> list[int]
             f'Scene "{scene.name}" has no view layer "{options.view_layer}": it has '
             f"{', '.join(each.name for each in scene.view_layers)}."
         )
-    return list(maps.frames_of(scene)) if options.frames is None else options.frames
+    return list(frame_setup.frames_of(scene)) if options.frames is None else options.frames
 
 
 def _json_stream(target: str | None, stack: contextlib.ExitStack) -> TextIO | None:
@@ -280,12 +304,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def register() -> None:
     """Give Blender the command."""
-    global _handle
-    _handle = bpy.utils.register_cli_command(NAME, run)
+    _handle.now = bpy.utils.register_cli_command(NAME, run)
 
 
 def unregister() -> None:
     """Take it back."""
-    global _handle
-    bpy.utils.unregister_cli_command(_handle)
-    _handle = None
+    bpy.utils.unregister_cli_command(_handle.now)
+    _handle.clear()

@@ -21,7 +21,9 @@ class Change(enum.Enum):
     SCENE = enum.auto()
     """A setting of how a scene is rendered: the hole, the sky, the maps."""
     OUTPUT = enum.auto()
-    """The scene's output."""
+    """The setting of the scene's output."""
+    SWITCHED = enum.auto()
+    """The output that the scene is set up for."""
     PREVIEW = enum.auto()
     """The switch of the live preview."""
 

@@ -9,10 +9,17 @@ import textwrap
 
 import bpy
 
+from .session import SESSION, Life
+
 POPUP_WIDTH = 80  # characters a line
 
-_pending: list[str] = []
-_is_ending = False
+_pending = SESSION.value(list[str], Life.REGISTRATION)
+_is_ending = False  # the process ends, whatever is registered
+
+
+def without_window() -> bool:
+    """Return whether nobody is there to read a message: a failure then has to end the process."""
+    return bpy.app.background
 
 
 def warn(text: str) -> None:
@@ -22,15 +29,16 @@ def warn(text: str) -> None:
 
 def popup(text: str) -> None:
     """Show a sentence in the window as soon as Blender's main thread is free; safe from a render's thread."""
-    if text in _pending:
+    if text in _pending.now:
         return
-    _pending.append(text)
+    _pending.now.append(text)
     if not bpy.app.timers.is_registered(_show_pending):
         bpy.app.timers.register(_show_pending)
 
 
 def _show_pending() -> None:
-    texts, _pending[:] = list(_pending), []
+    texts = _pending.now
+    _pending.clear()
     if not texts or not bpy.context.window_manager.windows:
         return
     lines = [line for text in texts for line in textwrap.wrap(text, POPUP_WIDTH)]

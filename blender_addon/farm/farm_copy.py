@@ -8,7 +8,7 @@ traces its rays itself (as with Rays: No Bake), because the name of an exit map 
 
 from collections import defaultdict
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from time import perf_counter
 
@@ -16,18 +16,18 @@ import bpy
 
 from ..core.errors import SceneError
 from ..core.physics_api import physics
-from ..outputs.lens import foreground, lens_camera, lens_shader, lens_sync
+from ..outputs import frames as frame_maps
+from ..outputs import registry
+from ..outputs.protocol import FrameCarrier, Track
 from ..outputs.shared import disk_light
 from ..scene import frame_setup
-from ..settings.scene_properties import IN_SHADER
-from ..ui.operators import TIMER_INTERVAL, reporting
+from ..ui.reporting import TIMER_INTERVAL, reporting
 
 SUFFIX = "_farm"
 # On the scene, in the copy: the first and last frame that have keyframes. `farm/umbra_farm.py` reads it.
 FRAMES = "umbra_farm_frames"
 
-# What is animated (a datablock, a path in it and an index), and its values by frame.
-Track = tuple[bpy.types.ID, str, int]
+# What is animated, and its values by frame.
 Tracks = dict[Track, dict[int, float]]
 
 _ADDON = "umbra."  # the paths of this add-on's settings begin so
@@ -66,8 +66,9 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
     if FRAMES in scene:
         raise SceneError("This file is a farm copy already: open the file that it was made from.")
     drivers = list(_drivers_of_settings())
-    tracks, lenses = yield from _read(scene, frames, drivers)
-    with _written(scene, frames, tracks, lenses, drivers):
+    carrier = registry.of(scene).carrier(scene)
+    tracks = yield from _read(scene, frames, drivers, carrier)
+    with _written(scene, frames, tracks, carrier, drivers):
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
         except RuntimeError as error:
@@ -79,53 +80,34 @@ def needs_copy(scene: bpy.types.Scene) -> bool:
     """Whether the scene's frames would be wrong without the add-on, but for those of such a copy."""
     if FRAMES in scene:
         return False
-    return any(map(lens_camera.is_lens, lens_camera.cameras_of(scene))) or any(True for _each in _drivers_of_settings())
+    return registry.of(scene).carrier(scene) is not None or any(True for _each in _drivers_of_settings())
 
 
 # --- reading --------------------------------------------------------------------------------------
 
 
 def _read(
-    scene: bpy.types.Scene, frames: range, drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]]
-) -> Generator[float, None, tuple[Tracks, dict[bpy.types.Camera, dict[str, object]]]]:
-    """All values by frame, and the parameters of each camera with a lens at the first of its frames."""
+    scene: bpy.types.Scene,
+    frames: range,
+    drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]],
+    carrier: FrameCarrier | None,
+) -> Generator[float, None, Tracks]:
+    """All values that change, by frame."""
     tracks: Tracks = defaultdict(dict)
-    lenses: dict[bpy.types.Camera, dict[str, object]] = {}
     layer = next((each for each in scene.view_layers if each.use), scene.view_layers[0])
     current = scene.frame_current
     try:
-        for done, frame in enumerate(frames if drivers or lens_sync.is_on(scene) else ()):
+        for done, frame in enumerate(frames if drivers or carrier is not None else ()):
             yield done / len(frames)
             scene.frame_set(frame)
             for owner, curve in drivers:
                 tracks[owner, curve.data_path, curve.array_index][frame] = _source_value(owner, curve)
-            if lens_sync.is_on(scene):
-                camera = lens_sync.camera_of(scene)
-                values = lens_sync.values_of(scene, frame_setup.read(scene, layer.depsgraph))
-                lenses.setdefault(camera, values)
-                _read_lens(scene, frame, values, tracks)
+            if carrier is not None:
+                for track, value in carrier.read(frame_maps.read(scene, layer.depsgraph)).items():
+                    tracks[track][frame] = value
     finally:
         scene.frame_set(current)
-    return {track: values for track, values in tracks.items() if len(set(values.values())) > 1}, lenses
-
-
-def _read_lens(scene: bpy.types.Scene, frame: int, parameters: dict[str, object], tracks: Tracks) -> None:
-    """The lens of a frame; the plain camera of the foreground follows it."""
-    camera = scene.camera.data
-    for name, value in parameters.items():
-        for index, number in enumerate(value if isinstance(value, tuple) else (value,)):
-            tracks[camera, f'cycles_custom["{name}"]', index][frame] = number
-    if scene.umbra.foreground_scene is None:
-        return
-    plain = scene.umbra.foreground_scene.camera.data
-    for prefix, owner, names in (
-        ("", camera, foreground.CAMERA_SETTINGS),
-        ("dof.", camera.dof, foreground.DEPTH_OF_FIELD),
-    ):
-        for name in names:
-            value = getattr(owner, name)
-            if isinstance(value, float):
-                tracks[plain, prefix + name, 0][frame] = value
+    return {track: values for track, values in tracks.items() if len(set(values.values())) > 1}
 
 
 def _drivers_of_settings() -> Iterator[tuple[bpy.types.ID, bpy.types.FCurve]]:
@@ -175,37 +157,33 @@ def _written(
     scene: bpy.types.Scene,
     frames: range,
     tracks: Tracks,
-    lenses: dict[bpy.types.Camera, dict[str, object]],
+    carrier: FrameCarrier | None,
     drivers: list[tuple[bpy.types.ID, bpy.types.FCurve]],
 ) -> Iterator[None]:
     """Have all that in the open file while it is saved, and nothing of it afterwards."""
     muted = [curve for _owner, curve in drivers if not curve.mute]
     device = getattr(scene.render, "compositor_device", None)
-    rays = scene.umbra.lens_rays
     made = []
     try:
         scene[FRAMES] = [frames[0], frames[-1]]
-        scene.umbra.lens_rays = IN_SHADER  # so that a machine with the add-on renders the same
         if device is not None:
             scene.render.compositor_device = "CPU"  # without a display there is usually no OpenGL
         for curve in muted:
             curve.mute = True
-        for camera, values in lenses.items():
-            lens_shader.write(camera, values)
-        for track, values in tracks.items():
-            made.append(_Curve(track, values))
-        yield
+        with nullcontext() if carrier is None else carrier.held():
+            try:
+                for track, values in tracks.items():
+                    made.append(_Curve(track, values))
+                yield
+            finally:
+                for each in reversed(made):
+                    each.remove()
     finally:
-        for curve in reversed(made):
-            curve.remove()
         for curve in muted:
             curve.mute = False
         if device is not None:
             scene.render.compositor_device = device
-        scene.umbra.lens_rays = rays
         del scene[FRAMES]
-        if lenses:
-            lens_sync.show_live(scene)
 
 
 class _Curve:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import bpy
 
-from ..bake import maps
+from ..bake.folder import folder
 from ..core.errors import SceneError
 from ..core.physics_api import exr
-from ..ui.operators import reporting
+from ..ui.reporting import reporting
 from ..ui.sidebar import HolePanel
 from . import farm_copy
 
@@ -56,7 +56,7 @@ def parameters_of(scene: bpy.types.Scene) -> dict[str, object]:
     return {
         "JobName": blend.stem,
         "BlendFile": str(farm_copy.path_beside(blend) if farm_copy.needs_copy(scene) else blend),
-        "MapFolder": str(maps.folder(scene).path),
+        "MapFolder": str(folder(scene).path),
         "FirstFrame": scene.frame_start,
         "LastFrame": scene.frame_end,
         "OutputFolder": str(picture if is_folder else picture.parent),

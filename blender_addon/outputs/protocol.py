@@ -178,6 +178,10 @@ class Output:
 
     # --- files ------------------------------------------------------------------------------------
 
+    def marks(self, scene: bpy.types.Scene) -> bool:
+        """Return whether a file of version 0.1.0, which does not say so, is set up for this output."""
+        return False
+
     def is_set_up(self, scene: bpy.types.Scene) -> bool:
         """Return whether the scene refers to maps of this output."""
         return True

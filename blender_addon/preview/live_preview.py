@@ -13,10 +13,12 @@ from dataclasses import dataclass, field, replace
 import bpy
 import numpy as np
 
+from ..core import changes
+from ..core.changes import Change
 from ..core.errors import SceneError
-from ..core.physics_api import physics, world_map
-from ..outputs.lens import lens_sync
-from ..outputs.world import lensed_world, world_sync
+from ..core.physics_api import physics
+from ..core.session import SESSION, Life, scene_of
+from ..outputs import frames, registry
 from ..scene import frame_setup
 from ..settings.scene_properties import ACCURACIES
 from . import thumbnail
@@ -46,23 +48,23 @@ class _State:
     """Seconds from the last change shown to its picture being in memory."""
 
 
-_states: dict[str, _State] = {}
-_suspended = False
+_states = SESSION.per_scene(_State, Life.FILE)
+_suspended = SESSION.value(bool, Life.FILE)
 
 
 def can_run() -> bool:
-    """Whether there is a window to show a preview in, and no render under way."""
-    return not bpy.app.background and not _suspended
+    """Return whether there is a window to show a preview in, and no render under way."""
+    return not bpy.app.background and not _suspended.now
 
 
 def is_on(scene: bpy.types.Scene) -> bool:
-    """Whether the scene's preview is switched on."""
-    return scene.umbra.live_preview
+    """Return whether the scene's preview is switched on."""
+    return bool(scene.umbra.live_preview)
 
 
 def state(scene: bpy.types.Scene) -> _State:
-    """The preview of a scene."""
-    return _states.setdefault(scene.name, _State())
+    """Return the preview of a scene."""
+    return _states.of(scene)
 
 
 # --- what calls for work --------------------------------------------------------------------------
@@ -74,32 +76,40 @@ def on_update(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
         _note(scene)
 
 
-def on_switched(scene: bpy.types.Scene) -> None:
+def on_switched(owner: bpy.types.ID) -> None:
     """The artist has switched the preview on or off."""
+    if not isinstance(owner, bpy.types.Scene):
+        return
+    scene = owner
     if is_on(scene):
         if can_run():
             state(scene).shown = state(scene).map_shown = None
             _note(scene)
         return
-    _states.pop(scene.name, None)
-    thumbnail.forget(scene.name)
-    if world_sync.shows_live(scene):
-        world_sync.drop_live(scene)
-    elif world_sync.is_on(scene):
-        world_sync.point_at_files(scene)  # after a problem it read nothing
+    _states.drop(scene)
+    thumbnail.forget(scene)
+    live = registry.of(scene).live
+    if live is None:
+        return
+    if live.is_shown(scene):
+        live.drop(scene)
+    else:
+        registry.of(scene).point_at_files(scene)  # after a problem it read nothing
 
 
-def on_output_switched(scene: bpy.types.Scene) -> None:
+def on_output_switched(owner: bpy.types.ID) -> None:
     """The scene's output is another one: a World that is shown should follow the camera."""
-    _states.pop(scene.name, None)
-    if world_sync.is_on(scene) and not bpy.app.background:
-        scene.umbra.live_preview = True
-    elif is_on(scene):
-        on_switched(scene)
+    if not isinstance(owner, bpy.types.Scene):
+        return
+    _states.drop(owner)
+    if registry.of(owner).follows_preview and not bpy.app.background:
+        owner.umbra.live_preview = True
+    elif is_on(owner):
+        on_switched(owner)
 
 
 def start_again() -> None:
-    """Show all previews anew: after undo, or when a file was opened or saved."""
+    """Show all previews again: after undo, or when a file was opened or saved."""
     for scene in bpy.data.scenes:
         if is_on(scene) and can_run():
             state(scene).shown = state(scene).map_shown = None
@@ -108,31 +118,29 @@ def start_again() -> None:
 
 def suspend() -> None:
     """Keep away while a render runs: it reads the maps of its frames."""
-    global _suspended
-    _suspended = True
+    _suspended.now = True
     drop_live()
 
 
 def resume() -> None:
     """The render is over."""
-    global _suspended
-    _suspended = False
+    _suspended.now = False
     start_again()
 
 
 def drop_live() -> None:
-    """Let all Worlds read the files of their frames, as a file that is saved should have it."""
-    for each in list(_states.values()):
+    """Let all scenes read the files of their frames, as a file that is saved should have it."""
+    for each in _states:
         each.steps = None
     for scene in bpy.data.scenes:
-        if scene.library is None and world_sync.shows_live(scene):
-            world_sync.drop_live(scene)
+        live = registry.of(scene).live
+        if scene.library is None and live is not None and live.is_shown(scene):
+            live.drop(scene)
 
 
 def forget() -> None:
-    """Drop everything: another file was opened, or the add-on goes."""
-    global _suspended
-    _suspended = False
+    """Drop everything: another file was opened, or the add-on is disabled."""
+    _suspended.clear()
     _states.clear()
     thumbnail.clear()
     if bpy.app.timers.is_registered(_tick):
@@ -161,12 +169,10 @@ def advance(budget: float) -> float | None:
     if not can_run():
         return None
     end = time.perf_counter() + budget
-    for name in list(_states):
-        scene = bpy.data.scenes.get(name)
-        if scene is None or not is_on(scene):
-            del _states[name]
+    for scene, now in _states.items():
+        if not is_on(scene):
+            _states.drop(scene)
             continue
-        now = _states[name]
         while can_run() and (now.steps is not None or now.changed):
             try:
                 _step(scene, now)
@@ -177,24 +183,26 @@ def advance(budget: float) -> float | None:
                 break
         if now.settle_at is not None and time.perf_counter() >= now.settle_at and now.steps is None:
             now.settle_at = None
-            world_sync.show_again(scene)
-    if any(each.steps is not None or each.changed for each in _states.values()):
+            live = registry.of(scene).live
+            if live is not None:
+                live.show_again(scene)
+    if any(each.steps is not None or each.changed for each in _states):
         return PAUSE
-    return SETTLE if any(each.settle_at is not None for each in _states.values()) else None
+    return SETTLE if any(each.settle_at is not None for each in _states) else None
 
 
 def _step(scene: bpy.types.Scene, now: _State) -> None:
     if now.steps is None:
         now.changed = False
-        depsgraph = lens_sync.depsgraph_of(scene)
-        frame = frame_setup.read(scene, depsgraph, velocity=np.zeros(3))
+        depsgraph = frame_setup.depsgraph_of(scene)
+        frame = frames.read(scene, depsgraph, np.zeros(3))
         now.problem = ""
         camera = _camera_of(scene, depsgraph, frame)
         key = (frame.parameters, camera, scene.umbra.output, thumbnail.key(scene))
         if key == now.shown:
             return
         now.shown = key
-        now.steps = _work(scene.name, frame, camera, now)
+        now.steps = _work(scene.session_uid, frame, camera, now)
         return
     try:
         next(now.steps)
@@ -203,7 +211,7 @@ def _step(scene: bpy.types.Scene, now: _State) -> None:
 
 
 def _camera_of(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.Shot
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup
 ) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
     """What the thumbnail is seen by; for a lens that only the World knows, all directions."""
     data = scene.camera.evaluated_get(depsgraph).data
@@ -214,28 +222,33 @@ def _camera_of(
 
 
 def _work(
-    name: str, frame: frame_setup.Shot, camera: "physics.PerspectiveCamera | physics.PanoramaCamera", now: _State
+    uid: int,
+    frame: frame_setup.FrameSetup,
+    camera: "physics.PerspectiveCamera | physics.PanoramaCamera",
+    now: _State,
 ) -> Generator[None, None, None]:
-    """Make a map and a thumbnail of a shot; the scene is looked up anew after each pause."""
+    """Make a map and a thumbnail of a frame; the scene is looked up again after each pause."""
     tolerance, _ = ACCURACIES["DRAFT"]
     draft = replace(frame.parameters, tolerance=tolerance, method=physics.DEFAULT_METHOD, disk=None)
-    scene = bpy.data.scenes.get(name)
-    wanted = world_map.world_parameters(draft, world_map.PREVIEW)
-    is_lensed = scene is not None and lensed_world.lensed_world(scene) is not None
-    if is_lensed and (wanted != now.map_shown or not world_sync.shows_live(scene)):
-        made = yield from _paused(world_map.world_map_steps(wanted))
-        scene = bpy.data.scenes.get(name)
-        if scene is None:
-            return
-        world_sync.show_live(scene, made)
-        now.map_shown = wanted
-        now.settle_at = time.perf_counter() + SETTLE if world_sync.needs_turns(scene) else None
-        now.latency = time.perf_counter() - now.since
-        _redraw()
-        yield
-    picture = yield from _paused(thumbnail.steps(name, replace(draft, camera=camera)))
-    if picture is not None:
-        thumbnail.show(name, picture)
+    scene = scene_of(uid)
+    live = None if scene is None else registry.of(scene).live
+    if scene is not None and live is not None and live.can_show(scene):
+        wanted = live.parameters(draft)
+        if wanted != now.map_shown or not live.is_shown(scene):
+            made = yield from _paused(live.steps(wanted))
+            scene = scene_of(uid)
+            if scene is None:
+                return
+            needs_another_look = live.show(scene, made)
+            now.map_shown = wanted
+            now.settle_at = time.perf_counter() + SETTLE if needs_another_look else None
+            now.latency = time.perf_counter() - now.since
+            _redraw()
+            yield
+    picture = yield from _paused(thumbnail.steps(uid, replace(draft, camera=camera)))
+    scene = scene_of(uid)
+    if picture is not None and scene is not None:
+        thumbnail.show(scene, picture)
         now.latency = now.latency or time.perf_counter() - now.since
         _redraw()
     now.updates += 1
@@ -252,10 +265,11 @@ def _paused(steps: Generator[float, None, object]) -> Generator[None, None, obje
 
 def _show_problem(scene: bpy.types.Scene) -> None:
     """Where there is nothing to show (no hole, no camera), show no older map: the World is magenta."""
-    thumbnail.forget(scene.name)
-    if lensed_world.lensed_world(scene) is not None and world_sync.shows_live(scene):
-        world_sync.drop_live(scene)
-        world_sync.point_at_nothing(scene)
+    thumbnail.forget(scene)
+    output = registry.of(scene)
+    if output.live is not None and output.live.can_show(scene) and output.live.is_shown(scene):
+        output.live.drop(scene)
+        output.take_away(scene)
     _redraw()
 
 
@@ -264,3 +278,20 @@ def _redraw() -> None:
         for area in window.screen.areas:
             if area.type in {"VIEW_3D", "PROPERTIES", "IMAGE_EDITOR"}:
                 area.tag_redraw()
+
+
+# --- registration ---------------------------------------------------------------------------------
+
+
+def register() -> None:
+    """Follow the switch of the preview, and that of the output."""
+    changes.subscribe(Change.PREVIEW, on_switched)
+    changes.subscribe(Change.SWITCHED, on_output_switched)
+
+
+def unregister() -> None:
+    """Drop the preview: nobody would point the scenes that show it at their files later."""
+    changes.unsubscribe(Change.SWITCHED, on_output_switched)
+    changes.unsubscribe(Change.PREVIEW, on_switched)
+    drop_live()
+    forget()

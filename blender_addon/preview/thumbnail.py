@@ -10,8 +10,8 @@ import bpy.utils.previews
 import numpy as np
 
 from ..core.physics_api import physics, reference_render
-from ..outputs.shared.compositor_tree import find_setup
-from ..outputs.world import lensed_world
+from ..core.session import SESSION, Life, scene_of
+from ..outputs import registry
 from ..scene import environment
 
 # Pixels of the longer side.
@@ -38,58 +38,65 @@ class _Sky:
     pixels: np.ndarray
 
 
-_collection: bpy.utils.previews.ImagePreviewCollection | None = None
-_skies: dict[str, _Sky] = {}
+def _no_collection() -> bpy.utils.previews.ImagePreviewCollection | None:
+    return None
+
+
+_collection = SESSION.value(_no_collection, Life.REGISTRATION)
+_skies = SESSION.per_scene(lambda: _Sky((), np.empty(0)), Life.FILE)
+
+
+def _preview_of(scene: bpy.types.Scene) -> bpy.types.ImagePreview | None:
+    found = _collection.now
+    key = str(scene.session_uid)
+    return found[key] if found is not None and key in found else None
 
 
 def icon(scene: bpy.types.Scene) -> int:
-    """The icon of a scene's thumbnail, 0 if there is none."""
-    if _collection is None or scene.name not in _collection:
-        return 0
-    return _collection[scene.name].icon_id
+    """Return the icon of a scene's thumbnail, 0 if there is none."""
+    preview = _preview_of(scene)
+    return 0 if preview is None else preview.icon_id
 
 
-def pixels(scene_name: str) -> np.ndarray | None:
-    """The thumbnail's pixels, shape (height, width, 4), row 0 at the bottom; None if there is none."""
-    if _collection is None or scene_name not in _collection:
+def pixels(scene: bpy.types.Scene) -> np.ndarray | None:
+    """Return the thumbnail's pixels, shape (height, width, 4), row 0 at the bottom; None if there is none."""
+    preview = _preview_of(scene)
+    if preview is None:
         return None
-    preview = _collection[scene_name]
     width, height = preview.image_size
     values = np.empty(width * height * 4, np.float32)
     preview.image_pixels_float.foreach_get(values)
     return values.reshape(height, width, 4)
 
 
-def show(scene_name: str, picture: np.ndarray) -> None:
+def show(scene: bpy.types.Scene, picture: np.ndarray) -> None:
     """Keep a picture, shape (height, width, 4), row 0 at the bottom, as the scene's thumbnail."""
-    global _collection
-    if _collection is None:
-        _collection = bpy.utils.previews.new()
-    preview = _collection[scene_name] if scene_name in _collection else _collection.new(scene_name)
+    if _collection.now is None:
+        _collection.now = bpy.utils.previews.new()
+    preview = _preview_of(scene) or _collection.now.new(str(scene.session_uid))
     height, width = picture.shape[:2]
     if tuple(preview.image_size) != (width, height):
         preview.image_size = (width, height)
     preview.image_pixels_float.foreach_set(np.ravel(picture).astype(np.float32))
 
 
-def forget(scene_name: str) -> None:
+def forget(scene: bpy.types.Scene) -> None:
     """Drop a scene's thumbnail."""
-    _skies.pop(scene_name, None)
-    if _collection is not None and scene_name in _collection:
-        del _collection[scene_name]
+    _skies.drop(scene)
+    if _preview_of(scene) is not None:
+        del _collection.now[str(scene.session_uid)]
 
 
 def clear() -> None:
     """Drop all thumbnails."""
-    global _collection
     _skies.clear()
-    if _collection is not None:
-        bpy.utils.previews.remove(_collection)
-        _collection = None
+    if _collection.now is not None:
+        bpy.utils.previews.remove(_collection.now)
+    _collection.clear()
 
 
-def steps(scene_name: str, parameters: "physics.WarpMapParameters") -> Generator[float, None, np.ndarray | None]:
-    """Make the thumbnail of a shot step by step; None if the scene is gone."""
+def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float, None, np.ndarray | None]:
+    """Make the thumbnail of a frame step by step; None if the scene is gone."""
     camera = parameters.camera
     longer = max(camera.width, camera.height)
     small = replace(
@@ -103,7 +110,7 @@ def steps(scene_name: str, parameters: "physics.WarpMapParameters") -> Generator
         interpolation=2e-3,
     )
     warp_map = yield from physics.bake_steps(small)
-    scene = bpy.data.scenes.get(scene_name)
+    scene = scene_of(uid)
     if scene is None:
         return None
     picture = reference_render.render(warp_map, _sky_of(scene), **look(scene)).sky
@@ -125,23 +132,15 @@ def look(scene: bpy.types.Scene) -> dict[str, object]:
         "brightness_amount": settings.redshift_brightness,
         "temperature": settings.sky_temperature,
     }
-    setup = find_setup(scene)
-    node = lensed_world.group_node(lensed_world.lensed_world(scene)) if setup is None else setup.group
-    if node is not None:
-        values |= {
-            name: node.inputs[socket].default_value for name, socket in _SOCKETS.items() if socket in node.inputs
-        }
+    placed = registry.of(scene).look(scene)
+    values |= {name: placed[socket] for name, socket in _SOCKETS.items() if socket in placed}
     try:
         sky = environment.read(scene)
     except physics.BlackHoleError:
         return values
-    if setup is not None:
-        rotation = node.inputs["Environment Rotation"].default_value
-        return values | {"rotation": tuple(rotation), "strength": node.inputs["Environment Strength"].default_value}
-    placed = lensed_world.placement(scene)
     return values | {
-        "rotation": tuple(placed.get("Rotation", sky.rotation)),
-        "strength": placed.get("Strength", sky.strength),
+        "rotation": tuple(placed.get("Environment Rotation", sky.rotation)),
+        "strength": placed.get("Environment Strength", sky.strength),
     }
 
 
@@ -153,10 +152,10 @@ def key(scene: bpy.types.Scene) -> tuple:
 def _sky_of(scene: bpy.types.Scene) -> np.ndarray:
     """The scene's sky, small, row 0 at the top; it is read once for each image."""
     image = _image_of(scene)
-    known = _skies.get(scene.name)
+    known = _skies.find(scene)
     if known is None or known.key != _image_key(image):
         known = _Sky(_image_key(image), _squares() if image is None else _shrunk(image))
-        _skies[scene.name] = known
+        _skies.put(scene, known)
     return known.pixels
 
 

@@ -420,3 +420,11 @@ def read_at(
 def frames_of(scene: bpy.types.Scene) -> range:
     """Return the frames that rendering the scene's animation renders."""
     return range(scene.frame_start, scene.frame_end + 1, max(scene.frame_step, 1))
+
+
+def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """Return the dependency graph of the scene's view layer, up to date."""
+    context = bpy.context
+    layer = context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
+    layer.update()
+    return layer.depsgraph

@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..core import changes
+from ..core.changes import Change
 from ..core.physics_api import disk_flux, disk_look, metric, physics
 
 # Blender saves an enum's number; identifiers are the physics' own names.
@@ -43,14 +45,12 @@ LOOK_FIELDS = (
 
 
 def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
-    """Carry a change into the compositors of the scenes that render this hole.
+    """Announce a change.
 
-    Every property has an update function: without one, Blender does not carry a script's new value into evaluated
-    data.
+    Every property has this as its update function: without one, Blender does not carry a script's new value into
+    evaluated data.
     """
-    from ..outputs.shared import disk_sync  # it reads these properties, hence not at the top
-
-    disk_sync.refresh_hole(settings.id_data)
+    changes.notify(Change.DISK, settings.id_data)
 
 
 def _amount(name: str, field: str, description: str) -> "bpy.types.FloatProperty":

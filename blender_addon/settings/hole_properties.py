@@ -3,7 +3,8 @@
 
 import bpy
 
-from ..core.physics_api import metric
+from ..core import changes
+from ..core.changes import Change
 from . import disk_properties
 
 # physics accepts spins up to this; a hole spinning the other way is the object turned over.
@@ -11,9 +12,6 @@ LARGEST_SPIN = 0.9999
 
 # With Blender's default camera, the shadow then fills most of the picture's height.
 DEFAULT_MASS_SCALE = 0.35
-
-# Blender draws Empties no smaller (scene units).
-SMALLEST_DISPLAY = 1e-4
 
 CAMERA_ANIMATION = "CAMERA_ANIMATION"
 
@@ -29,18 +27,12 @@ MOTIONS = {
 
 
 def _changed(settings: "UmbraHoleProperties", _context: object) -> None:
-    """Draw the Empty's sphere at the size of the horizon.
+    """Announce a change.
 
-    Every property has this as its update function, also where the sphere stays the same: without one, Blender
-    does not carry a script's new value into evaluated data.
+    Every property has this as its update function: without one, Blender does not carry a script's new value into
+    evaluated data.
     """
-    hole = settings.id_data
-    if settings.is_black_hole and isinstance(hole, bpy.types.Object) and hole.type == "EMPTY":
-        hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
-    if settings.disk.enabled:  # its innermost orbit depends on the spin, and its light on the size
-        from ..outputs.shared import disk_sync  # it reads these properties, hence not at the top
-
-        disk_sync.refresh_hole(hole)
+    changes.notify(Change.HOLE, settings.id_data)
 
 
 class UmbraHoleProperties(bpy.types.PropertyGroup):

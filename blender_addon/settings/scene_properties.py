@@ -3,7 +3,10 @@
 
 import bpy
 
+from ..core import changes
+from ..core.changes import Change
 from ..core.physics_api import color, lens, physics
+from . import output_choice
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
 ACCURACIES = {
@@ -12,8 +15,6 @@ ACCURACIES = {
     "REFERENCE": (1e-11, 0.0),
 }
 
-# What becomes of the hole: identifiers that are saved in files.
-COMPOSITOR, CYCLES_LENS, WORLD = "COMPOSITOR", "CYCLES_LENS", "WORLD"
 EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
 # Blender saves an enum's number, so a method keeps the one it has here.
@@ -37,20 +38,8 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     output: bpy.props.EnumProperty(
         name="Output",
         description="How the black hole comes into the picture",
-        items=(
-            (COMPOSITOR, "Compositor", "The sky is bent behind the render: every engine, and a new sky costs nothing"),
-            (
-                CYCLES_LENS,
-                "Cycles Lens",
-                "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole",
-            ),
-            (
-                WORLD,
-                "World",
-                "The World itself is bent: in the viewport too, in Cycles and EEVEE, with its light and reflections",
-            ),
-        ),
-        default=COMPOSITOR,
+        items=output_choice.items,
+        default=0,  # the number: items that are asked for have no default by name
         update=lambda settings, _context: _output_changed(settings),
         options=set(),
     )
@@ -222,32 +211,15 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
 
 
 def _refresh(settings: UmbraSceneProperties) -> None:
-    """Carry a change into the compositor or the camera, where the set-up is in place."""
-    from ..outputs.compositor import compositor_sync
-    from ..outputs.lens import lens_sync
-    from ..outputs.shared import disk_sync
-    from ..outputs.world import world_sync  # they read these properties, hence not at the top
-
-    scene = settings.id_data
-    if isinstance(scene, bpy.types.Scene) and compositor_sync.find_setup(scene) is not None:
-        compositor_sync.refresh(scene)
-    if isinstance(scene, bpy.types.Scene) and settings.output == CYCLES_LENS:
-        lens_sync.show_live(scene)
-        disk_sync.refresh_or_warn(scene)
-    if isinstance(scene, bpy.types.Scene) and settings.output == WORLD:
-        world_sync.refresh(scene)
+    changes.notify(Change.SCENE, settings.id_data)
 
 
 def _output_changed(settings: UmbraSceneProperties) -> None:
-    from ..outputs import switching as output  # it reads these properties, hence not at the top
-
-    output.on_switched(settings.id_data)
+    changes.notify(Change.OUTPUT, settings.id_data)
 
 
 def _preview_changed(settings: UmbraSceneProperties) -> None:
-    from ..preview import live_preview as preview  # it reads these properties, hence not at the top
-
-    preview.on_switched(settings.id_data)
+    changes.notify(Change.PREVIEW, settings.id_data)
 
 
 def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:

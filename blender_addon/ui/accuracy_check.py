@@ -5,60 +5,69 @@ from collections.abc import Generator
 
 import bpy
 
-from ..bake import baking, maps
+from ..bake import baking
+from ..bake.check import fault_of
 from ..core.errors import SceneError
 from ..core.physics_api import accuracy, physics
-from ..outputs.lens import lens_sync
-from ..outputs.world import world_sync
+from ..core.session import SESSION, Life, scene_of
+from ..outputs import frames, registry
 from ..scene import environment, frame_setup
-from .operators import BakeOperator
+from .bake_operators import BakeOperator
 from .sidebar import HolePanel
 from .status import wrapped
 
-# The last report of each scene, by its number in this session, with its frame. Not saved: a map may change meanwhile.
-_reports: dict[int, tuple[int, "accuracy.AccuracyReport"]] = {}
+Report = tuple[int, "accuracy.AccuracyReport"]
 
 
-def report_of(scene: bpy.types.Scene) -> "tuple[int, accuracy.AccuracyReport] | None":
-    """The frame and the report of the last check of a scene, if there was one."""
-    return _reports.get(scene.session_uid)
+def _no_report() -> Report | None:
+    return None
+
+
+# The last report of each scene, with its frame. Not saved: a map may change meanwhile.
+_reports = SESSION.per_scene(_no_report, Life.FILE)
+
+
+def report_of(scene: bpy.types.Scene) -> Report | None:
+    """Return the frame and the report of the last check of a scene, if there was one."""
+    return _reports.find(scene)
 
 
 def check_frame(
-    scene_name: str, view_layer_name: str | None = None
+    scene: bpy.types.Scene, view_layer_name: str | None = None
 ) -> "Generator[baking.Progress, None, accuracy.AccuracyReport]":
     """Check the map of a scene's current frame.
 
     Raises
     ------
     physics.BlackHoleError
-        There is no map that holds, or the frame is impossible.
+        If there is no valid map, or the frame is impossible.
     """
-    scene = bpy.data.scenes[scene_name]
-    if lens_sync.is_on(scene) and not lens_sync.uses_maps(scene):
-        raise SceneError("The lens traces its rays itself (Rays: No Bake): there is no map to check.")
-    if world_sync.is_on(scene):
-        raise SceneError(
-            "Check Accuracy knows no world maps: choose Output: Compositor or Cycles Lens, and bake this frame."
-        )
     layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
-    frame_shot = frame_setup.read_at(scene, scene.frame_current, layer)
-    parameters = baking.parameters_of(scene, frame_shot)
-    path = baking.path_of(scene, frame_shot)
-    fault = maps.fault_of(path, parameters)
+    frame = frames.read_at(scene, scene.frame_current, layer)
+    wanted = registry.of(scene).request_to_check(scene, frame)
+    fault = fault_of(wanted)
     if fault is not None:
         raise SceneError(f"{fault}: press Bake This Frame first.")
-    number = scene.session_uid  # the scene itself must not be kept while the work waits
     steps = accuracy.accuracy_steps(
-        path, passes=maps.pass_paths(path, parameters), environment_width=_environment_width(scene)
+        wanted.path, passes=list(wanted.passes), environment_width=_environment_width(scene)
     )
+    return _progress(scene.session_uid, frame.frame, steps)
+
+
+def _progress(
+    uid: int, frame: int, steps: "Generator[float, None, accuracy.AccuracyReport]"
+) -> "Generator[baking.Progress, None, accuracy.AccuracyReport]":
+    """Tell of each step, and keep the report; the scene itself must not be kept while the work waits."""
     while True:
         try:
             fraction = next(steps)
         except StopIteration as end:
-            _reports[number] = (frame_shot.frame, end.value)
-            return end.value
-        yield baking.Progress(frame_shot.frame, fraction, f"Frame {frame_shot.frame}")
+            report: accuracy.AccuracyReport = end.value
+            scene = scene_of(uid)
+            if scene is not None:
+                _reports.put(scene, (frame, report))
+            return report
+        yield baking.Progress(frame, fraction, f"Frame {frame}")
 
 
 def _environment_width(scene: bpy.types.Scene) -> int:
@@ -82,7 +91,7 @@ class UMBRA_OT_check_accuracy(BakeOperator, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> Generator:
         frame_setup.active_hole(context.scene)
-        return check_frame(context.scene.name, context.view_layer.name)
+        return check_frame(context.scene, context.view_layer.name)
 
     def _report(self, report: "accuracy.AccuracyReport") -> None:
         level = "WARNING" if report.differing or report.unresolved else "INFO"

@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..bake import baking, cache, maps
-from . import operators, status
+from ..bake import cache
+from ..core.session import SESSION, Life, scene_of
+from ..outputs import frames, registry
+from ..scene import frame_setup
+from . import status
+from .bake_operators import BakeOperator
 from .sidebar import UmbraPanel
 
 
@@ -16,23 +20,19 @@ from .sidebar import UmbraPanel
 class Told:
     """What the panel says of a scene's maps."""
 
-    listing: cache.Listing
+    listing: cache.Listing | None
     when: str
 
 
-# The last verification of each scene, by the file's path and the scene's name.
-_told: dict[tuple[str, str], Told] = {}
+# The last verification of each scene.
+_told = SESSION.per_scene(lambda: Told(None, ""), Life.FILE)
 
 
-def _key(scene: bpy.types.Scene) -> tuple[str, str]:
-    return bpy.data.filepath, scene.name
-
-
-class CacheOperator(operators.BakeOperator):
+class CacheOperator(BakeOperator):
     """Work on the maps of the frames that rendering the animation renders."""
 
     def frames(self, scene: bpy.types.Scene) -> list[int]:
-        return list(maps.frames_of(scene))
+        return list(frame_setup.frames_of(scene))
 
 
 class UMBRA_OT_verify_maps(CacheOperator, bpy.types.Operator):
@@ -45,11 +45,13 @@ class UMBRA_OT_verify_maps(CacheOperator, bpy.types.Operator):
     stopped = "Verifying was stopped."
 
     def work(self, context: bpy.types.Context) -> Generator:
-        self._key = _key(context.scene)
-        return cache.examine(context.scene.name, self.frames(context.scene), context.view_layer.name)
+        self._uid = context.scene.session_uid
+        return frames.examine(context.scene, self.frames(context.scene), context.view_layer.name)
 
     def _report(self, listing: cache.Listing) -> None:
-        _told[self._key] = Told(listing, time.strftime("%H:%M"))
+        scene = scene_of(self._uid)
+        if scene is not None:
+            _told.put(scene, Told(listing, time.strftime("%H:%M")))
         self.report({"INFO"} if listing.complete else {"WARNING"}, listing.sentence())
 
 
@@ -72,8 +74,8 @@ class UMBRA_OT_clean_maps(CacheOperator, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context) -> Generator:
         scene = context.scene
-        _told.pop(_key(scene), None)
-        return cache.clean(scene.name, self.frames(scene), context.view_layer.name, everything=self.everything)
+        _told.drop(scene)
+        return frames.clean(scene, self.frames(scene), context.view_layer.name, everything=self.everything)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -93,8 +95,8 @@ class UMBRA_OT_clean_maps(CacheOperator, bpy.types.Operator):
 
 def lines(scene: bpy.types.Scene) -> list[status.Line]:
     """What is known of a scene's maps."""
-    told = _told.get(_key(scene))
-    if told is None:
+    told = _told.find(scene)
+    if told is None or told.listing is None:
         return [status.Line("Not verified yet", "QUESTION")]
     found = [status.Line(f"{len(told.listing.frames)} frames, {told.listing.size / 1e6:.1f} MB at {told.when}", "FILE")]
     icons = {cache.State.VALID: "CHECKMARK", cache.State.MISSING: "RADIOBUT_OFF", cache.State.STALE: "FILE_REFRESH"}
@@ -114,7 +116,7 @@ class VIEW3D_PT_umbra_cache(UmbraPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return baking.needs_maps(context.scene)
+        return registry.of(context.scene).needs_maps(context.scene)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -3,16 +3,11 @@
 
 import bpy
 
-from ..outputs.lens import lens_disk, lens_sync
-from ..outputs.shared.compositor_tree import find_setup
+from ..outputs import registry
 from ..scene import frame_setup
 from ..settings.hole_properties import CAMERA_ANIMATION
-from ..settings.scene_properties import COMPOSITOR
-from . import operators, status
-from .sidebar import UmbraPanel
-
-LOOK_CONTROLS = ("Exposure", "Redshift Color", "Redshift Brightness", "Sky Temperature")
-PLACEMENT_CONTROLS = ("Environment Rotation", "Environment Strength")
+from . import bake_operators, status
+from .sidebar import HolePanel, UmbraPanel
 
 
 def _hole(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -31,7 +26,10 @@ def _draw_hole(layout: bpy.types.UILayout, hole: bpy.types.Object) -> None:
 def _draw_lines(layout: bpy.types.UILayout, lines: tuple[status.Line, ...]) -> None:
     column = layout.column(align=True)
     for line in lines:
-        column.label(text=line.text, icon=line.icon)
+        if line.operator:
+            column.operator(line.operator)
+        else:
+            column.label(text=line.text, icon=line.icon)
 
 
 class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
@@ -51,17 +49,12 @@ class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
             layout.column(align=True).prop(scene.umbra, "output", expand=True)
         _draw_lines(layout, status.lines(context))
 
-        if operators.running is not None:
-            progress = operators.running
+        progress = bake_operators.running()
+        if progress is not None:
             layout.progress(factor=progress.fraction, text=f"{progress.text}  {progress.fraction:.0%}")
             layout.operator("umbra.stop_baking", icon="CANCEL")
             return
-        if hole is None:
-            return
-        lensed = lens_sync.is_on(scene)
-        if scene.umbra.output == COMPOSITOR and find_setup(scene) is None:
-            layout.operator("umbra.setup_compositor", icon="NODE_COMPOSITING")
-        if lensed and not lens_sync.uses_maps(scene) and not lens_disk.is_in_use(scene):
+        if hole is None or not registry.of(scene).needs_maps(scene):
             return
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")
@@ -81,62 +74,15 @@ class VIEW3D_PT_umbra_hole(UmbraPanel, bpy.types.Panel):
         _draw_hole(self.layout, _hole(context))
 
 
-class VIEW3D_PT_umbra_sky(UmbraPanel, bpy.types.Panel):
-    bl_label = "Sky"
-    bl_parent_id = "VIEW3D_PT_umbra"
+class VIEW3D_PT_umbra_output(HolePanel, bpy.types.Panel):
+    bl_label = ""  # that of the output is drawn
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return find_setup(context.scene) is not None
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.label(text=registry.of(context.scene).settings_label)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        settings = context.scene.umbra
-        row = layout.row()
-        row.prop(settings, "environment_source", expand=True)
-        if settings.environment_source == "IMAGE":
-            layout.template_ID(settings, "environment_image", open="image.open")
-            layout.operator("umbra.use_star_sky", icon="OUTLINER_OB_LIGHT")
-        problem = status.sky_problem(context.scene)
-        if problem is not None:
-            _draw_lines(layout, status.wrapped(problem, "ERROR"))
-        group = find_setup(context.scene).group
-        layout.use_property_split = False  # the names are too long to stand beside their fields
-        column = layout.column()
-        column.active = settings.environment_source == "IMAGE"
-        _draw_inputs(column, group, PLACEMENT_CONTROLS)
-        _draw_inputs(layout, group, LOOK_CONTROLS)
-
-
-def _draw_inputs(layout: bpy.types.UILayout, group: bpy.types.Node, names: tuple[str, ...]) -> None:
-    for name in names:
-        socket = group.inputs.get(name)
-        if socket is not None and not socket.is_linked:
-            layout.prop(socket, "default_value", text=name)
-
-
-class VIEW3D_PT_umbra_lens(UmbraPanel, bpy.types.Panel):
-    bl_label = "Lens"
-    bl_parent_id = "VIEW3D_PT_umbra"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return lens_sync.is_on(context.scene)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        settings = context.scene.umbra
-        layout.prop(settings, "lens_rays")
-        layout.prop(settings, "sphere_radius")
-        layout.prop(settings, "redshift_color")
-        layout.prop(settings, "redshift_brightness")
-        layout.prop(settings, "sky_temperature")
-        layout.prop(settings, "cpu_fallback")
-        layout.operator("umbra.set_up_foreground", icon="OUTLINER_COLLECTION")
-        if settings.foreground is not None:
-            layout.operator("umbra.remove_foreground", icon="X")
+        self.layout.use_property_split = True
+        registry.of(context.scene).draw_settings(self.layout, context.scene)
 
 
 class VIEW3D_PT_umbra_maps(UmbraPanel, bpy.types.Panel):
@@ -156,9 +102,6 @@ class VIEW3D_PT_umbra_maps(UmbraPanel, bpy.types.Panel):
             layout.prop(settings, "tolerance")
             layout.prop(settings, "interpolation")
         layout.prop(settings, "method")
-        if find_setup(context.scene) is not None:
-            layout.operator("umbra.setup_compositor", text="Update Compositor", icon="FILE_REFRESH")
-            layout.operator("umbra.remove_compositor", icon="X")
 
 
 class OBJECT_PT_umbra(bpy.types.Panel):
@@ -186,8 +129,7 @@ class OBJECT_PT_umbra(bpy.types.Panel):
 CLASSES = (
     VIEW3D_PT_umbra,
     VIEW3D_PT_umbra_hole,
-    VIEW3D_PT_umbra_sky,
-    VIEW3D_PT_umbra_lens,
+    VIEW3D_PT_umbra_output,
     VIEW3D_PT_umbra_maps,
     OBJECT_PT_umbra,
 )

@@ -1,31 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel says about a scene, from Blender and the maps' headers: cheap enough for drawing."""
 
-import textwrap
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ..bake import baking, maps
+from ..bake.check import count_baked, is_valid
+from ..bake.request import MapRequest
 from ..core.physics_api import metric, physics
-from ..outputs.compositor.compositor_sync import takes_sky_from_settings
-from ..outputs.lens import lens_objects, lens_shader, lens_sync
-from ..outputs.shared.compositor_tree import find_setup
-from ..outputs.world import world_sync
-from ..scene import environment, frame_setup
+from ..core.session import SESSION, Life
+from ..outputs import frames, registry
+from ..outputs.shared import drawing
+from ..scene import frame_setup
+from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
 
-# How many characters a line of a panel shows: its width less margins and icon, over a character's mean width, in
-# pixels at an interface scale of 1.
-MARGIN, CHARACTER_WIDTH = 50.0, 6.0
-SHORTEST_LINE, ORDINARY_LINE = 20, 40
-
-# Seconds for which the number of maps in the folder is not counted anew.
+# Seconds for which the number of maps in the folder is not counted again.
 COUNT_INTERVAL = 1.0
-_counted: dict[tuple[object, ...], tuple[float, int]] = {}
+
+
+@dataclass
+class _Count:
+    """How many maps were counted, of what, and when."""
+
+    of_what: object = None
+    moment: float = -COUNT_INTERVAL
+    number: int = 0
+
+
+_counts = SESSION.per_scene(dict[str, _Count], Life.FILE)
 
 
 @dataclass(frozen=True)
@@ -34,32 +39,13 @@ class Line:
 
     text: str
     icon: str = "NONE"
-
-
-def _line_width() -> int:
-    region = bpy.context.region
-    if region is None:
-        return ORDINARY_LINE
-    scale = bpy.context.preferences.system.ui_scale
-    return max(int((region.width / scale - MARGIN) / CHARACTER_WIDTH), SHORTEST_LINE)
+    operator: str = ""
+    """Draw this operator's button instead."""
 
 
 def wrapped(text: str, icon: str) -> tuple[Line, ...]:
-    """A sentence as lines that fit the panel being drawn, the icon in front of the first."""
-    parts = textwrap.wrap(text, _line_width())
-    return tuple(Line(part, icon if index == 0 else "BLANK1") for index, part in enumerate(parts))
-
-
-def sky_problem(scene: bpy.types.Scene) -> str | None:
-    """Why the sky cannot be read, if so."""
-    setup = find_setup(scene)
-    if setup is not None and not takes_sky_from_settings(setup):
-        return None
-    try:
-        environment.check_image(environment.read(scene).image)
-    except physics.BlackHoleError as error:
-        return str(error)
-    return None
+    """Return a sentence as lines that fit the panel being drawn, the icon in front of the first."""
+    return tuple(Line(part, icon if index == 0 else "BLANK1") for index, part in enumerate(drawing.wrapped(text)))
 
 
 def lines(context: bpy.types.Context) -> tuple[Line, ...]:
@@ -70,21 +56,17 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     try:
         # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
         depsgraph = context.evaluated_depsgraph_get()
-        now = frame_setup.read(scene, depsgraph, velocity=np.zeros(3))
-        lensed = lens_sync.is_on(scene)
-        if lensed:
-            lens_sync.check(scene)
+        now = frames.read(scene, depsgraph, np.zeros(3))
+        notices = registry.of(scene).notices(scene, depsgraph, now)
     except physics.BlackHoleError as error:
         return wrapped(str(error), "ERROR")
     found: list[Line] = []
-    if lensed:
-        found += _lens_lines(scene, depsgraph, now)
-    elif world_sync.is_on(scene):
-        found += _world_lines(scene, now)
-    elif find_setup(scene) is None:
-        found += wrapped("The compositor is not set up: a render shows no black hole.", "ERROR")
-    for path, parameters in baking.maps_of(scene, now):
-        found += _map_lines(scene, now, path, parameters)
+    for notice in notices:
+        found += wrapped(notice.text, notice.icon)
+        if notice.operator:
+            found.append(Line("", operator=notice.operator))
+    for wanted in frames.requests_of(scene, now):
+        found += _map_lines(scene, now, wanted)
     found += _place_lines(now)
     others = len(frame_setup.holes(scene)) - 1
     if others > 0:
@@ -92,66 +74,34 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     return tuple(found)
 
 
-def _lens_lines(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, now: frame_setup.Shot) -> list[Line]:
+def _map_lines(scene: bpy.types.Scene, now: FrameSetup, wanted: MapRequest) -> list[Line]:
+    noun = wanted.kind.noun
     found: list[Line] = []
-    problem = lens_shader.device_problem(scene)
-    if problem is not None:
-        found += wrapped(problem, "INFO" if scene.umbra.cpu_fallback else "ERROR")
-    for warning in lens_objects.warnings(scene, depsgraph, now):
-        found += wrapped(warning, "INFO")
-    if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
-        found += wrapped("The viewport shows the lens without the camera's speed; a render has it.", "INFO")
-    return found
-
-
-def _world_lines(scene: bpy.types.Scene, now: frame_setup.Shot) -> list[Line]:
-    found: list[Line] = []
-    try:
-        world_sync.check(scene)
-    except physics.BlackHoleError as error:
-        found += wrapped(str(error), "ERROR")
-    for warning in world_sync.warnings(scene, now):
-        found += wrapped(warning, "ERROR")
-    return found
-
-
-def _map_lines(
-    scene: bpy.types.Scene, now: frame_setup.Shot, path: Path, parameters: "physics.WarpMapParameters"
-) -> list[Line]:
-    folder = maps.folder(scene)
-    noun = maps.kind_of(path).noun
-    found: list[Line] = []
-    if not path.is_file():
+    if not wanted.path.is_file():
         found += wrapped(f"This frame's {noun} is not baked.", "RADIOBUT_OFF")
     elif frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
         found += wrapped(f"This frame's {noun} is baked; rendering checks it.", "CHECKMARK")
-    elif maps.is_fresh(path, parameters, thorough=False):
+    elif is_valid(wanted, thorough=False):
         found += wrapped(f"This frame's {noun} is up to date.", "CHECKMARK")
     else:
         found += wrapped(f"This frame's {noun} is out of date.", "FILE_REFRESH")
-    frames = maps.frames_of(scene)
-    found.append(Line(f"{_baked(scene, now, frames, path, parameters)} of {len(frames)} frames baked", "SEQUENCE"))
-    if folder.is_temporary:
+    every = frame_setup.frames_of(scene)
+    found.append(Line(f"{_baked(scene, now, every, wanted)} of {len(every)} frames baked", "SEQUENCE"))
+    if wanted.folder.is_temporary:
         found += wrapped("This file is not saved: its maps are in a temporary folder.", "INFO")
     return found
 
 
-def _baked(
-    scene: bpy.types.Scene, now: frame_setup.Shot, frames: range, path: Path, parameters: "physics.WarpMapParameters"
-) -> int:
-    size = parameters.map_size
-    kind = maps.kind_of(path)
-    key = (maps.folder(scene).path, maps.stem(scene, now.hole_name, size), frames, kind.noun)
-    moment, number = _counted.get(key, (-COUNT_INTERVAL, 0))
-    if time.monotonic() - moment >= COUNT_INTERVAL:
-        number = maps.count_baked(scene, now.hole_name, size, frames, kind)
-        if len(_counted) > 1:
-            _counted.clear()
-        _counted[key] = (time.monotonic(), number)
-    return number
+def _baked(scene: bpy.types.Scene, now: FrameSetup, every: range, wanted: MapRequest) -> int:
+    count = _counts.of(scene).setdefault(wanted.kind.noun, _Count())
+    of_what = (wanted.folder.path, now.hole_name, wanted.parameters.map_size, every)
+    if count.of_what != of_what or time.monotonic() - count.moment >= COUNT_INTERVAL:
+        count.of_what, count.moment = of_what, time.monotonic()
+        count.number = count_baked(scene, now.hole_name, wanted, every)
+    return count.number
 
 
-def _place_lines(now: frame_setup.Shot) -> list[Line]:
+def _place_lines(now: FrameSetup) -> list[Line]:
     parameters = now.parameters
     distance = now.distance
     found = [Line(f"Camera at {distance:.4g} M", "CAMERA_DATA")]

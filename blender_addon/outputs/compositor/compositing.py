@@ -15,7 +15,6 @@ from ..shared import disk_sync
 from ..shared.compositor_tree import (
     GROUP,
     MAP,
-    OUTPUT,
     RENDER_LAYER,
     ROLE,
     SKY,
@@ -25,6 +24,16 @@ from ..shared.compositor_tree import (
     find_tree,
     has_scene_tree,
     render_layers,
+)
+from ..shared.tree_editing import (
+    OUTPUT_LINK,
+    add_render_layer,
+    background_layer,
+    check_shared,
+    give_back,
+    make_tree,
+    output_node,
+    remove_tree,
 )
 from .compositor_sync import refresh
 
@@ -221,5 +230,3 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     layer = find_node(tree, RENDER_LAYER)
     if layer is not None and not tree_is_new and not any(each.is_linked for each in layer.outputs):
         tree.nodes.remove(layer)
-
-

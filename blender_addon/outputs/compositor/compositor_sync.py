@@ -3,12 +3,15 @@
 
 import bpy
 
-from ...bake import maps
+from ...bake.folder import folder
+from ...bake.request import WARP_MAP, sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
 from ...scene import environment, frame_setup
-from ..shared import disk_sync
+from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
+from ..shared.map_images import NO_MAP, read_sequence
+from . import disk
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
 
@@ -39,7 +42,8 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     if setup is None:
         return
     repair(scene, thorough=False)
-    disk_sync.refresh(scene)
+    disk_light.refresh(scene, frame_setup.find_active_hole(scene))
+    disk.refresh(scene)
     try:
         point_at_maps(scene)
     except SceneError as error:
@@ -64,12 +68,12 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
     samples = int(scene.umbra.supersampling)
     width, height = frame_setup.render_size(scene.render)
     size = (width * samples, height * samples)
-    _set_map_path(scene, maps.blender_map_path(scene, hole.name, size, 1))
+    _set_map_path(scene, sequence_path(scene, hole.name, size, WARP_MAP))
 
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the map node read no map at all: the picture is magenta until a valid map is in place."""
-    _set_map_path(scene, maps.folder(scene).blender_path + NO_MAP)
+    _set_map_path(scene, folder(scene).blender_path + NO_MAP)
 
 
 def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
@@ -84,7 +88,7 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
     if setup is None or setup.map is None:
         return
     read_sequence(setup.map, MAP_IMAGE_NAME, path)
-    point_passes(setup.tree, path)
+    disk_sync.point_passes(setup.tree, path)
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:

@@ -35,5 +35,3 @@ def _put_in(scene: bpy.types.Scene, setup: Setup) -> bpy.types.Node:
     if not setup.group.inputs[SOCKET].is_linked:
         setup.tree.links.new(node.outputs[disk_group.OUTPUT], setup.group.inputs[SOCKET])
     return node
-
-

@@ -7,13 +7,14 @@ are shared: those of the collection "Umbra Foreground" are seen by the plain cam
 """
 
 import bpy
+import numpy as np
 
 from ...core.errors import SceneError
 from ...scene import frame_setup
-from ...settings.scene_properties import COMPOSITOR
-from ..compositor import compositing
+from .. import registry
+from ..shared import tree_editing
 from ..shared.compositor_tree import ROLE, find_node, find_tree, has_scene_tree
-from . import lens_camera, lens_objects, lens_tree
+from . import lens_camera, lens_objects, lens_sync, lens_tree
 
 COLLECTION_NAME, BACKGROUND_NAME = "Umbra Foreground", "Umbra Background"
 LAYER, OVER = lens_tree.FOREGROUND_LAYER, lens_tree.FOREGROUND_OVER
@@ -27,6 +28,11 @@ DEPTH_OF_FIELD = (
 )
 
 
+def can_set_up(scene: bpy.types.Scene) -> bool:
+    """Return whether the scene's cameras bend their rays."""
+    return registry.of(scene).identifier == "CYCLES_LENS"
+
+
 def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Put what is nearer than the hole in front, unlensed, or bring that up to date; return the names of new objects.
 
@@ -35,7 +41,9 @@ def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
     SceneError
         There is nothing nearer than the hole, or no camera.
     """
-    nearer = lens_objects.place(scene, depsgraph, frame_setup.read(scene, depsgraph, velocity=(0.0, 0.0, 0.0))).nearer
+    nearer = lens_objects.place(
+        scene, depsgraph, frame_setup.read(scene, depsgraph, np.zeros(3), lens_sync.TRAITS)
+    ).nearer
     settings = scene.umbra
     if settings.foreground is None and not nearer:
         raise SceneError(
@@ -112,7 +120,7 @@ def _make_plain(second: bpy.types.Scene) -> None:
         second.use_nodes = False
     else:
         second.compositing_node_group = None
-    second.umbra.output = COMPOSITOR  # it has no camera to restore, and no group
+    second.umbra.output = registry.default().identifier  # it has no camera to restore, and no group
 
 
 def _follow_camera(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
@@ -178,7 +186,7 @@ def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
 def _compose(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     """Put the second scene's picture over what the compositor gives out."""
     tree = lens_tree.claim(scene)
-    output = compositing.output_node(tree)
+    output = tree_editing.output_node(tree)
     if output is None:
         raise SceneError(f'The compositor of scene "{scene.name}" has no output node: add one.')
     layer, over = find_node(tree, LAYER), find_node(tree, OVER)

@@ -8,29 +8,29 @@ ignores them, and the shader is given what they say. Only what is written over i
 import bpy
 
 from ...core.errors import SceneError
+from ...scene.camera_type import BEFORE, CUSTOM, is_converted
 
-# On the camera's data: what it was before.
-BEFORE = "umbra_lens_before"
 SHADER_BEFORE = "umbra_lens_shader_before"  # a pointer cannot lie among other values
 
-CUSTOM = "CUSTOM"
 _REMEMBERED = ("type", "custom_mode", "custom_filepath", "custom_bytecode", "custom_bytecode_hash")
-
-
-def is_lens(camera: bpy.types.Camera) -> bool:
-    """Whether the camera bends its rays by this add-on's shader."""
-    return camera.type == CUSTOM and BEFORE in camera
-
-
-def original_type(camera: bpy.types.Camera) -> str:
-    """The type of the camera, for one that bends its rays the type before."""
-    return str(camera[BEFORE]["type"]) if is_lens(camera) else camera.type
 
 
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Camera]:
     """The data of the cameras that the scene renders with: the active one, and those its markers bind."""
     objects = [scene.camera, *(marker.camera for marker in scene.timeline_markers)]
     return list(dict.fromkeys(each.data for each in objects if each is not None and each.type == "CAMERA"))
+
+
+def check(camera: bpy.types.Camera) -> None:
+    """Refuse a camera that cannot be converted.
+
+    Raises
+    ------
+    SceneError
+        If the camera is linked from another file.
+    """
+    if not is_converted(camera) and camera.library is not None:
+        raise SceneError(f'Camera "{camera.name}" is linked from another file: make it local first.')
 
 
 def convert(camera: bpy.types.Camera) -> None:
@@ -41,10 +41,9 @@ def convert(camera: bpy.types.Camera) -> None:
     SceneError
         The camera is linked from another file.
     """
-    if is_lens(camera):
+    if is_converted(camera):
         return
-    if camera.library is not None:
-        raise SceneError(f'Camera "{camera.name}" is linked from another file: make it local first.')
+    check(camera)
     forget(camera)
     before: dict[str, object] = {name: getattr(camera, name) for name in _REMEMBERED}
     # Before 5.0 the group itself is a custom property, made when it is first looked at.
@@ -64,7 +63,7 @@ def restore(camera: bpy.types.Camera) -> None:
     if BEFORE not in camera:
         return
     before = camera[BEFORE].to_dict()
-    kept_type = None if is_lens(camera) else camera.type
+    kept_type = None if is_converted(camera) else camera.type
     for name in list(camera.cycles_custom.keys()):
         del camera.cycles_custom[name]
     for name, value in before["parameters"].items():

@@ -6,18 +6,18 @@ picture of the render layer goes through the group "Umbra Disk" before it goes w
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ...bake import maps
+from ...bake.folder import folder
+from ...bake.request import WARP_MAP, MapRequest, request, sequence_path
 from ...core.physics_api import physics
 from ...nodes import disk_group
 from ...scene import frame_setup
-from ..compositor import compositing, compositor_sync
-from ..shared import disk_sync
+from ..shared import disk_sync, tree_editing
 from ..shared.compositor_tree import find_node, find_tree, has_scene_tree, render_layers
+from ..shared.map_images import NO_MAP, read_sequence
 from . import lens_tree
 
 
@@ -33,11 +33,11 @@ def put_in(scene: bpy.types.Scene) -> bpy.types.Node:
     node = disk_sync.ensure_node(scene, tree)
     if node.inputs[disk_group.BEHIND].is_linked:
         return node
-    output = compositing.output_node(tree)
+    output = tree_editing.output_node(tree)
     layers = render_layers(tree, scene)
-    layer = compositing.background_layer(output.inputs[0], layers, set()) if output is not None else None
+    layer = tree_editing.background_layer(output.inputs[0], layers, set()) if output is not None else None
     if layer is None:
-        layer = layers[0] if layers else compositing.add_render_layer(tree, scene)
+        layer = layers[0] if layers else tree_editing.add_render_layer(tree, scene)
     picture = layer.outputs["Image"]
     fed = [link.to_socket for link in picture.links]
     tree.links.new(picture, node.inputs[disk_group.BEHIND])
@@ -47,7 +47,7 @@ def put_in(scene: bpy.types.Scene) -> bpy.types.Node:
     disk_sync.arrange(tree, node)
     if output is not None and not output.inputs[0].is_linked:
         tree.links.new(node.outputs[disk_group.IMAGE], output.inputs[0])
-        node[compositing.OUTPUT_LINK] = True
+        node[tree_editing.OUTPUT_LINK] = True
     return node
 
 
@@ -56,9 +56,27 @@ def take_out(scene: bpy.types.Scene) -> None:
     tree = find_tree(scene)
     node = find_node(tree, disk_sync.DISK) if tree is not None else None
     if node is not None:
-        compositing.give_back(tree, node, disk_group.BEHIND)
+        tree_editing.give_back(tree, node, disk_group.BEHIND)
         disk_sync.remove(tree)
     lens_tree.release(scene)
+
+
+def refresh(scene: bpy.types.Scene) -> None:
+    """Put the disk's nodes into the compositor, bring them up to date, or take them out.
+
+    Raises
+    ------
+    SceneError
+        If the compositor tree belongs to another file or scene.
+    """
+    if scene.library is not None:
+        return
+    hole = disk_sync.wanted_hole(scene)
+    if hole is None:
+        take_out(scene)
+        return
+    disk_sync.update(scene, hole, put_in(scene))
+    point_at_passes(scene)
 
 
 def is_in_use(scene: bpy.types.Scene) -> bool:
@@ -73,7 +91,7 @@ def is_in_use(scene: bpy.types.Scene) -> bool:
 # --- passes ---------------------------------------------------------------------------------------
 
 
-def parameters_of(scene: bpy.types.Scene, frame: frame_setup.Shot) -> "physics.WarpMapParameters":
+def parameters_of(scene: bpy.types.Scene, frame: frame_setup.FrameSetup) -> "physics.WarpMapParameters":
     """What the map is made from whose passes are drawn: the frame's own, or of the part that is rendered."""
     part = _part(scene)
     if part is None:
@@ -81,9 +99,9 @@ def parameters_of(scene: bpy.types.Scene, frame: frame_setup.Shot) -> "physics.W
     return replace(frame.parameters, camera=frame.parameters.camera.cropped(*part))
 
 
-def path_of(scene: bpy.types.Scene, frame: frame_setup.Shot) -> Path:
-    """Where that map lies, or will lie; its passes are beside it."""
-    return maps.map_path(scene, frame.hole_name, parameters_of(scene, frame).map_size, frame.frame)
+def request_of(scene: bpy.types.Scene, frame: frame_setup.FrameSetup) -> MapRequest:
+    """Return the request for that map; its passes are beside it."""
+    return request(scene, frame, WARP_MAP, parameters_of(scene, frame))
 
 
 def point_at_passes(scene: bpy.types.Scene) -> None:
@@ -94,12 +112,13 @@ def point_at_passes(scene: bpy.types.Scene) -> None:
     samples = int(scene.umbra.supersampling)
     part = _part(scene)
     width, height = frame_setup.render_size(scene.render) if part is None else part[2:]
-    compositor_sync.point_passes(tree, maps.blender_map_path(scene, hole.name, (width * samples, height * samples), 1))
+    size = (width * samples, height * samples)
+    disk_sync.point_passes(tree, sequence_path(scene, hole.name, size, WARP_MAP))
 
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let them read nothing: the picture is magenta until valid passes are in place."""
-    move_passes(scene, maps.folder(scene).blender_path, compositor_sync.NO_MAP)
+    move_passes(scene, folder(scene).blender_path, NO_MAP)
 
 
 def move_passes(scene: bpy.types.Scene, blender_folder: str, name: str | None = None) -> None:
@@ -108,12 +127,20 @@ def move_passes(scene: bpy.types.Scene, blender_folder: str, name: str | None = 
     if tree is None:
         return
     if name is not None:
-        compositor_sync.point_passes(tree, blender_folder + name)
+        disk_sync.point_passes(tree, blender_folder + name)
         return
     for node, _crossing in disk_sync.passes_of(tree):
         if node.image is not None:
             path = blender_folder + bpy.path.basename(node.image.filepath)
-            compositor_sync.read_sequence(node, node.image.name, path)
+            read_sequence(node, node.image.name, path)
+
+
+def forget_loaded_passes(scene: bpy.types.Scene) -> None:
+    """Let Blender read the passes from their files again."""
+    tree = find_tree(scene)
+    for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
+        if node.image is not None:
+            node.image.reload()
 
 
 def _part(scene: bpy.types.Scene) -> tuple[int, int, int, int] | None:

@@ -27,7 +27,7 @@ class Placement:
     """Those beside or behind the hole that are nearer to it than the disk's outer edge."""
 
 
-def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.Shot) -> Placement:
+def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup) -> Placement:
     """Sort the objects that are rendered by their bounding boxes; instances count for the objects that make them.
 
     A bent ray begins where it passes the hole. Of a straight ray from the camera that is where it enters the half of
@@ -70,7 +70,7 @@ def _distance(matrix: np.ndarray, low: np.ndarray, high: np.ndarray, point: np.n
     return float(np.linalg.norm(local - np.clip(local, low * lengths, high * lengths)))
 
 
-def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.Shot) -> list[str]:
+def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup) -> list[str]:
     """Sentences about what the picture lacks."""
     found = place(scene, depsgraph, frame)
     sentences = []

@@ -10,19 +10,18 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.physics_api import lens, physics
 from ...scene import frame_setup
-from ...settings.scene_properties import CYCLES_LENS, EXIT_MAP
+from ...scene.camera_type import is_converted
+from ...settings.scene_properties import EXIT_MAP
 from . import lens_camera, lens_shader
 
 # The first version whose Cycles counts a texture's rows from the bottom.
 UPWARDS_SINCE = (5, 2, 0)
 
+# A camera that bends its rays can render a part of the picture.
+TRAITS = frame_setup.Traits(crops=True)
+
 # A picture without anything in it: the parameters are not valid.
 BROKEN = {"broken": 1}
-
-
-def is_on(scene: bpy.types.Scene) -> bool:
-    """Whether the scene's cameras bend their rays."""
-    return scene.umbra.output == CYCLES_LENS
 
 
 def uses_maps(scene: bpy.types.Scene) -> bool:
@@ -38,7 +37,7 @@ def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMap
     return replace(parameters, hole_to_world=physics.IDENTITY, disk=None)
 
 
-def values_of(scene: bpy.types.Scene, frame: frame_setup.Shot, map_path: Path | None = None) -> dict[str, object]:
+def values_of(scene: bpy.types.Scene, frame: frame_setup.FrameSetup, map_path: Path | None = None) -> dict[str, object]:
     """The shader's parameters for a frame; with an exit map, those of the variant that looks rays up."""
     settings = scene.umbra
     values = asdict(lens.LensNumbers.of(frame.parameters))
@@ -73,27 +72,38 @@ def check(scene: bpy.types.Scene) -> None:
         )
 
 
-def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
-    """The data of the scene's camera, converted if it is not yet.
+def check_camera(scene: bpy.types.Scene) -> None:
+    """Refuse a scene without a camera.
 
     Raises
     ------
     SceneError
-        There is no camera, or it cannot be converted.
+        If there is none.
     """
     if scene.camera is None or scene.camera.type != "CAMERA":
         raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+
+
+def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
+    """Return the data of the scene's camera, converted if it is not yet.
+
+    Raises
+    ------
+    SceneError
+        If there is no camera, or it cannot be converted.
+    """
+    check_camera(scene)
     lens_camera.convert(scene.camera.data)
     return scene.camera.data
 
 
 def break_camera(scene: bpy.types.Scene) -> None:
     """Let the camera see nothing until `show` gives it valid parameters."""
-    if scene.camera is not None and scene.camera.type == "CAMERA" and lens_camera.is_lens(scene.camera.data):
+    if scene.camera is not None and scene.camera.type == "CAMERA" and is_converted(scene.camera.data):
         lens_shader.write(scene.camera.data, BROKEN)
 
 
-def show(scene: bpy.types.Scene, frame: frame_setup.Shot, map_path: Path | None = None) -> None:
+def show(scene: bpy.types.Scene, frame: frame_setup.FrameSetup, map_path: Path | None = None) -> None:
     """Let the camera see a frame, by its exit map or without.
 
     Raises
@@ -110,18 +120,10 @@ def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     The camera's own speed, which would take steps to other frames, is taken as none here.
     """
     if depsgraph is None:
-        depsgraph = depsgraph_of(scene)
+        depsgraph = frame_setup.depsgraph_of(scene)
     try:
         check(scene)
         camera_of(scene)
-        show(scene, frame_setup.read(scene, depsgraph, velocity=np.zeros(3)))
+        show(scene, frame_setup.read(scene, depsgraph, np.zeros(3), TRAITS))
     except physics.BlackHoleError:  # the panel and the render say why
         break_camera(scene)
-
-
-def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
-    """The dependency graph of the scene's view layer, up to date."""
-    context = bpy.context
-    layer = context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
-    layer.update()
-    return layer.depsgraph

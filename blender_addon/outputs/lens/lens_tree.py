@@ -3,8 +3,7 @@
 
 import bpy
 
-from ..compositor import compositing
-from ..shared import disk_sync
+from ..shared import disk_sync, tree_editing
 from ..shared.compositor_tree import ROLE, find_node, find_tree, has_scene_tree
 
 # On the scene: what was there before.
@@ -29,7 +28,7 @@ def claim(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     """
     tree = find_tree(scene)
     if tree is not None:
-        compositing.check_shared(scene, tree)
+        tree_editing.check_shared(scene, tree)
     if BEFORE in scene and tree is not None:
         return tree
     settings = dict(_SETTINGS)
@@ -39,7 +38,7 @@ def claim(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     used = not has_scene_tree() or scene.use_nodes
     scene[BEFORE] = {**before, "tree_is_new": tree is None, "use_nodes": used}
     if tree is None:
-        tree = compositing.make_tree(scene)
+        tree = tree_editing.make_tree(scene)
     elif not used:
         scene.use_nodes = True
     for name, value in settings.items():
@@ -55,7 +54,7 @@ def release(scene: bpy.types.Scene) -> None:
     before = scene[BEFORE].to_dict()
     if tree is not None and before["tree_is_new"]:
         if all(node.get(ROLE) for node in tree.nodes):
-            compositing.remove_tree(scene, tree)
+            tree_editing.remove_tree(scene, tree)
         else:
             for node in tree.nodes:  # what remains is the artist's own from now on
                 if ROLE in node:

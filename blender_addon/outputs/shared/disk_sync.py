@@ -9,20 +9,19 @@ import math
 
 import bpy
 
-from ...core import messages
+from ...bake.request import pass_path
 from ...core.errors import SceneError
 from ...core.physics_api import disk_flux, disk_texture, metric, orbiting_matter, physics
 from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
-from . import disk_light
-from .compositor_tree import ROLE, Setup, find_node, find_setup, find_tree
+from .compositor_tree import ROLE, find_node, find_tree
+from .map_images import read_sequence
 
 DISK = "disk"
 TABLE_ROLES = {disk_group.COLORS: "disk_colors", disk_group.TEXTURE: "disk_texture"}
 # Nodes that only files have whose group was of version 1.
 FORMER_ROLES = ("disk_profile",)
-SOCKET = "Disk"  # of the group "Umbra Black Hole"
 
 
 def pass_role(number: int) -> str:

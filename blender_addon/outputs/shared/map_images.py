@@ -37,5 +37,3 @@ def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
             setattr(node, name, value)
     if node.image.filepath != path:
         node.image.filepath = path
-
-

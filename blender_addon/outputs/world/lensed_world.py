@@ -23,6 +23,11 @@ OF_IMAGE, OF_WORLD = "image", "world"
 # frame to fill.
 IMPORTANCE_RESOLUTION = 512
 
+_NO_BACKGROUND = (
+    'World "{}" has no Background node that could be bent: connect one to its output, or choose Sky: Image in the '
+    "Umbra panel."
+)
+
 # Kinds of nodes that look in the ray's direction when their input Vector is not linked.
 _LOOK_BY_THEMSELVES = ("TEX_ENVIRONMENT", "TEX_SKY")
 
@@ -39,6 +44,27 @@ def group_node(world: bpy.types.World | None) -> bpy.types.Node | None:
         return None
     nodes = world.node_tree.nodes
     return next((node for node in nodes if node.type == "GROUP" and world_group.is_group(node.node_tree)), None)
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Refuse a scene that has no sky that could be lensed.
+
+    Raises
+    ------
+    SceneError
+        If `install` would fail.
+    """
+    if lensed_world(scene) is not None:
+        return
+    if scene.umbra.environment_source == "IMAGE":
+        environment.read(scene)
+        return
+    world = scene.world
+    if world is None:
+        raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
+    uses_nodes = bpy.app.version >= (5, 0) or world.use_nodes
+    if uses_nodes and not any(node.type == "BACKGROUND" for node in world.node_tree.nodes):
+        raise SceneError(_NO_BACKGROUND.format(world.name))
 
 
 def install(scene: bpy.types.Scene) -> bpy.types.Node:
@@ -168,10 +194,7 @@ def _insert(world: bpy.types.World) -> bpy.types.Node:
     tree = world.node_tree
     backgrounds = [node for node in tree.nodes if node.type == "BACKGROUND"]
     if not backgrounds:
-        raise SceneError(
-            f'World "{world.name.removesuffix(" (lensed)")}" has no Background node that could be bent: connect one to '
-            "its output, or choose Sky: Image in the Umbra panel."
-        )
+        raise SceneError(_NO_BACKGROUND.format(world.name.removesuffix(" (lensed)")))
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = world_group.new_group()
     node.name = node.label = world_group.GROUP_NAME

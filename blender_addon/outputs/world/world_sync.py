@@ -4,23 +4,19 @@
 import bpy
 import numpy as np
 
-from ...bake import maps
+from ...bake.folder import folder
+from ...bake.request import WORLD_MAP, sequence_path
 from ...core import messages
 from ...core.errors import SceneError
-from ...core.physics_api import physics, world_map
+from ...core.physics_api import world_map
 from ...nodes import world_group
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
-from ...settings.scene_properties import WORLD
-from ..compositor import compositor_sync
+from ..shared.look import look_of_group, write_to_group
+from ..shared.map_images import NO_MAP, SEQUENCE_SETTINGS, map_image
 from . import lensed_world
 
 FILE_IMAGE_NAME, LIVE_IMAGE_NAME = "Umbra World Map", "Umbra Live Map"
-
-
-def is_on(scene: bpy.types.Scene) -> bool:
-    """Whether the scene's output is its World."""
-    return scene.umbra.output == WORLD
 
 
 def refresh(scene: bpy.types.Scene) -> None:
@@ -28,11 +24,11 @@ def refresh(scene: bpy.types.Scene) -> None:
     world = lensed_world.lensed_world(scene)
     shows_image = scene.umbra.environment_source == "IMAGE"
     if world is not None and scene.get(lensed_world.IS_BENT) and _is_stale(scene, world, shows_image=shows_image):
-        values = inputs_of(lensed_world.group_node(world))
+        values = look_of_group(lensed_world.group_node(world))
         before = scene.get(lensed_world.BEFORE)
         try:
             lensed_world.remove(scene)
-            set_inputs(lensed_world.install(scene), values)
+            write_to_group(lensed_world.install(scene), values)
         except SceneError as error:
             messages.warn(str(error))
             scene.world = before
@@ -50,19 +46,6 @@ def _is_stale(scene: bpy.types.Scene, world: bpy.types.World, *, shows_image: bo
         return False
     texture = next((node for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT"), None)
     return texture is not None and texture.image != scene.umbra.environment_image
-
-
-def inputs_of(node: bpy.types.Node) -> dict[str, float]:
-    """The values of a group node's inputs that are not linked."""
-    return {socket.name: socket.default_value for socket in node.inputs if not socket.is_linked}
-
-
-def set_inputs(node: bpy.types.Node, values: dict[str, object]) -> None:
-    """Give a group node those values that it has inputs for."""
-    for name, value in values.items():
-        socket = node.inputs.get(name)
-        if socket is not None and not socket.is_linked and isinstance(value, float):
-            socket.default_value = value
 
 
 # --- which map is read ----------------------------------------------------------------------------
@@ -88,7 +71,7 @@ def _point(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
         if node.image != image:
             node.image = image
         if image.source == "SEQUENCE":
-            for name, value in compositor_sync.SEQUENCE_SETTINGS.items():
+            for name, value in SEQUENCE_SETTINGS.items():
                 if getattr(node.image_user, name) != value:
                     setattr(node.image_user, name, value)
 
@@ -105,7 +88,7 @@ def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
     world = lensed_world.lensed_world(scene)
     present = _own(world, lensed_world.FILE_IMAGE)
     if present is None:
-        present = compositor_sync.map_image(FILE_IMAGE_NAME)
+        present = map_image(FILE_IMAGE_NAME)
         present.use_half_precision = False
         world[lensed_world.FILE_IMAGE] = present
     return present
@@ -127,13 +110,12 @@ def point_at_files(scene: bpy.types.Scene) -> None:
         point_at_nothing(scene)
         return
     columns, rows = world_map.FINAL
-    name = maps.world_map_name(scene, hole.name, (columns, rows + 1), 1)
-    _point_at_path(scene, maps.folder(scene).blender_path + name)
+    _point_at_path(scene, sequence_path(scene, hole.name, (columns, rows + 1), WORLD_MAP))
 
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the World read no map: it is magenta."""
-    _point_at_path(scene, maps.folder(scene).blender_path + compositor_sync.NO_MAP)
+    _point_at_path(scene, folder(scene).blender_path + NO_MAP)
 
 
 def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
@@ -231,55 +213,3 @@ def drop_live(scene: bpy.types.Scene) -> None:
     for image in images:
         if image.users == 0:
             bpy.data.images.remove(image)
-
-
-# --- rendering ------------------------------------------------------------------------------------
-
-
-def check(scene: bpy.types.Scene) -> None:
-    """Refuse a scene whose World is not the lensed one any more.
-
-    Raises
-    ------
-    SceneError
-        Another World was chosen, or a view layer has one of its own.
-    """
-    if lensed_world.lensed_world(scene) is None:
-        raise SceneError(
-            f'Scene "{scene.name}" has the output World, but another World was chosen since: set Output: World again.'
-        )
-    for layer in scene.view_layers:
-        if layer.use and getattr(layer, "world_override", None) is not None:
-            raise SceneError(
-                f'View layer "{layer.name}" has a World Override, which hides the lensed World: clear it in View Layer '
-                "Properties, or choose another output."
-            )
-
-
-def check_resolved(metadata: dict, frame_shot: frame_setup.Shot) -> None:
-    """Refuse a map with rays that its method could not resolve.
-
-    Raises
-    ------
-    SceneError
-        There are some.
-    """
-    unresolved = metadata["counts"]["unresolved"]
-    if unresolved:
-        label = physics.METHODS[frame_shot.parameters.method].label
-        raise SceneError(
-            f"Frame {frame_shot.frame}: {unresolved} rays of the world map could not be resolved by the method "
-            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
-        )
-
-
-def warnings(scene: bpy.types.Scene, frame_shot: frame_setup.Shot) -> list[str]:
-    """What a render of a frame leaves out, in sentences."""
-    found = []
-    if scene.render.film_transparent:
-        found.append("Film > Transparent is on: the camera does not see the World.")
-    if frame_shot.parameters.disk is not None:
-        found.append(
-            f'The disk of "{frame_shot.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.'
-        )
-    return found

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Output: Compositor, as the rest of the add-on knows it."""
+
+import bpy
+
+from ...bake.request import WARP_MAP, MapRequest, request
+from ...core import messages
+from ...core.errors import SceneError
+from ...core.physics_api import physics
+from ...nodes import black_hole_group
+from ...scene import environment
+from ...scene.frame_setup import FrameSetup
+from ..protocol import Look, Notice, Output
+from ..shared import disk_sync, leaving
+from ..shared.compositor_tree import check_linked, check_rendered, find_setup, find_tree, is_in_use
+from ..shared.look import look_of_group, write_to_group
+from ..shared.tree_editing import check_shared
+from . import compositing, compositor_sync, disk, panel
+
+NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
+
+
+class CompositorOutput(Output):
+    """The sky is bent behind the render by a node group."""
+
+    identifier = "COMPOSITOR"
+    number = 0
+    label = "Compositor"
+    description = "The sky is bent behind the render: every engine, and a new sky costs nothing"
+    settings_label = "Sky"
+
+    # --- setting a scene up -----------------------------------------------------------------------
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        """Refuse a compositor tree that is not the scene's alone."""
+        tree = find_tree(scene)
+        if tree is not None and leaving.is_left(scene):
+            check_shared(scene, tree)
+
+    def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
+        """Set the compositor up again if it was when the scene left it."""
+        if not leaving.give_back(scene):
+            return []
+        notes = compositing.set_up(scene)
+        setup = find_setup(scene)
+        if setup is not None:
+            write_to_group(setup.group, look)
+        return notes
+
+    def remove(self, scene: bpy.types.Scene) -> None:
+        """Take the set-up out, and keep what is needed to put it back."""
+        setup = find_setup(scene)
+        look = {} if setup is None else look_of_group(setup.group)
+        in_compositor = setup is not None or compositing.BEFORE in scene
+        if in_compositor:
+            compositing.remove(scene)
+        leaving.keep(scene, look, in_compositor=in_compositor)
+
+    def look(self, scene: bpy.types.Scene) -> Look:
+        """Return the values of the group's inputs."""
+        setup = find_setup(scene)
+        return {} if setup is None else look_of_group(setup.group)
+
+    def refresh(self, scene: bpy.types.Scene) -> None:
+        """Carry the scene's settings into the set-up."""
+        compositor_sync.refresh(scene)
+
+    def refresh_disk(self, scene: bpy.types.Scene) -> None:
+        """Carry the disk's settings into the set-up."""
+        disk.refresh(scene)
+
+    def set_up(self, scene: bpy.types.Scene) -> list[str]:
+        """Put the black hole into the compositor, or bring it up to date there; return what the artist should know.
+
+        Raises
+        ------
+        SceneError
+            If the scene has another output, or its compositor cannot be changed.
+        """
+        if scene.umbra.output != self.identifier:
+            raise SceneError("This scene's output is another one: choose Output: Compositor first.")
+        return compositing.set_up(scene)
+
+    def can_be_removed(self, scene: bpy.types.Scene) -> bool:
+        """Return whether anything of the set-up is in the compositor."""
+        return find_setup(scene) is not None or compositing.BEFORE in scene
+
+    def take_out(self, scene: bpy.types.Scene) -> None:
+        """Take the black hole out of the compositor; the output stays.
+
+        Raises
+        ------
+        SceneError
+            If there is nothing to remove.
+        """
+        compositing.remove(scene)
+
+    def on_hole_added(self, scene: bpy.types.Scene) -> list[str]:
+        """Choose the star sky where the World has none, and set the compositor up."""
+        settings = scene.umbra
+        stars = False
+        if settings.environment_source == "WORLD":
+            try:
+                environment.read_world(scene)
+            except SceneError:
+                stars = settings.environment_image is None
+                settings.environment_image = settings.environment_image or environment.load_star_sky()
+                settings.environment_source = "IMAGE"
+        notes = compositing.set_up(scene)
+        if stars:
+            self.brighten_stars(scene)
+        return notes
+
+    def brighten_stars(self, scene: bpy.types.Scene) -> None:
+        """Brighten the star sky, unless the artist has set an exposure."""
+        setup = find_setup(scene)
+        exposure = None if setup is None else setup.group.inputs.get("Exposure")
+        if exposure is not None and exposure.default_value == 0.0:
+            exposure.default_value = environment.STAR_SKY_EXPOSURE
+
+    def on_load(self, scene: bpy.types.Scene) -> None:
+        """Bring a node group of an older version up to date."""
+        setup = find_setup(scene)
+        if setup is not None and setup.tree.library is None:
+            compositor_sync.repair(scene)
+            compositor_sync.refresh(scene)
+
+    # --- rendering --------------------------------------------------------------------------------
+
+    def is_in_use(self, scene: bpy.types.Scene) -> bool:
+        """Return whether rendering the scene runs the group."""
+        return is_in_use(scene)
+
+    def uses_compositor(self, scene: bpy.types.Scene) -> bool:
+        """Return True: the group is in the compositor."""
+        return True
+
+    def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+        """Return the frame's warp map."""
+        return [request(scene, frame, WARP_MAP, frame.parameters)]
+
+    def begin_render(self, scene: bpy.types.Scene) -> None:
+        """Mend what was changed by hand inside the set-up; refuse what cannot be mended."""
+        if compositor_sync.repair(scene):
+            messages.warn(
+                f'the node group "{black_hole_group.GROUP_NAME}" was damaged or of another version, and is built anew.'
+            )
+        check_linked(scene)
+        compositor_sync.sync_sky(scene)
+
+    def take_away(self, scene: bpy.types.Scene) -> None:
+        """Let the group read no map, and refuse a compositor that could not show one."""
+        compositor_sync.point_at_nothing(scene)
+        check_rendered(scene)
+        check_linked(scene)
+
+    def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
+        """Let the group read the frame's map."""
+        (wanted,) = self.map_requests(scene, frame)
+        warnings = _unresolved(wanted, frame)
+        disk_sync.check_shot(scene, frame.parameters)
+        compositor_sync.point_at_maps(scene)
+        return warnings
+
+    def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
+        """After a failure the map stays away.
+
+        The window runs the compositor once more when the render is over, and an older map would then hide the magenta.
+        """
+        if canceled:
+            self.refresh(scene)
+
+    # --- files ------------------------------------------------------------------------------------
+
+    def is_set_up(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the group is in the compositor."""
+        return find_setup(scene) is not None
+
+    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
+        """Let the group read the same files from another folder."""
+        compositor_sync.move_map_path(scene, blender_folder)
+
+    def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
+        """Let Blender read the maps from their files again."""
+        compositor_sync.forget_loaded_map(scene)
+
+    # --- the panel --------------------------------------------------------------------------------
+
+    def look_node(self, scene: bpy.types.Scene) -> bpy.types.Node | None:
+        """Return the group's node."""
+        setup = find_setup(scene)
+        return None if setup is None else setup.group
+
+    def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
+        """Say where the compositor is not set up."""
+        if find_setup(scene) is not None:
+            return []
+        return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+
+    def sky_problem(self, scene: bpy.types.Scene) -> str | None:
+        """Return why the sky cannot be read, unless it is the artist's own nodes."""
+        setup = find_setup(scene)
+        if setup is not None and not compositor_sync.takes_sky_from_settings(setup):
+            return None
+        try:
+            environment.check_image(environment.read(scene).image)
+        except physics.BlackHoleError as error:
+            return str(error)
+        return None
+
+    def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+        """Draw the sky."""
+        panel.draw(layout, scene, self.sky_problem(scene))
+
+
+def _unresolved(wanted: MapRequest, frame: FrameSetup) -> list[str]:
+    """Refuse, where nobody sees the magenta, a map with pixels that its method could not resolve."""
+    count = wanted.kind.format.read_metadata(wanted.path)["counts"]["unresolved"]
+    if not count:
+        return []
+    text = (
+        f"Frame {frame.frame}: {count} pixels could not be resolved by the method "
+        f'"{physics.METHODS[frame.parameters.method].label}" and are magenta; choose the method "Fast" in the '
+        "Umbra panel, which resolves them."
+    )
+    if messages.without_window():
+        raise SceneError(text)
+    return [text]

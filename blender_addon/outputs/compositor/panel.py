@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sky's settings in the sidebar, and what sets the compositor up. It only draws."""
+
+import bpy
+
+from ..shared.compositor_tree import find_setup
+from ..shared.drawing import draw_inputs, draw_problem, draw_sky_choice
+from ..shared.look import PLACEMENT, SHARED
+
+LOOK_CONTROLS = ("Exposure", *SHARED.values())
+PLACEMENT_CONTROLS = tuple(PLACEMENT.values())
+
+
+def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene, problem: str | None) -> None:
+    """Draw which sky there is, how it is placed and how it looks."""
+    setup = find_setup(scene)
+    if setup is None:
+        return
+    settings = scene.umbra
+    draw_sky_choice(layout, settings)
+    if settings.environment_source == "IMAGE":
+        layout.operator("umbra.use_star_sky", icon="OUTLINER_OB_LIGHT")
+    if problem is not None:
+        draw_problem(layout, problem)
+    layout.use_property_split = False  # the names are too long to stand beside their fields
+    column = layout.column()
+    column.active = settings.environment_source == "IMAGE"
+    draw_inputs(column, setup.group, PLACEMENT_CONTROLS)
+    draw_inputs(layout, setup.group, LOOK_CONTROLS)
+    layout.operator("umbra.setup_compositor", text="Update Compositor", icon="FILE_REFRESH")
+    layout.operator("umbra.remove_compositor", icon="X")

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a scene with an output: what each is made of, which maps it needs, and work on those maps.
+
+Long work is a generator that is resumed from Blender's event loop, where undo or a newly loaded file may have replaced
+every datablock since the last time. So it holds a scene's number in the session, and looks the scene up each time.
+"""
+
+import functools
+from collections.abc import Generator, Iterable
+from typing import Any
+
+import bpy
+
+from ..bake import baking, cache
+from ..bake.request import MapRequest
+from ..core.errors import SceneError
+from ..core.session import scene_of
+from ..scene import frame_setup
+from ..scene.frame_setup import FrameSetup
+from . import registry
+
+
+def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Any = None) -> FrameSetup:
+    """Return the setup of the frame at which the dependency graph stands; see `frame_setup.read`."""
+    return frame_setup.read(scene, depsgraph, velocity, registry.of(scene).traits)
+
+
+def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> FrameSetup:
+    """Return the setup of any frame; see `frame_setup.read_at`."""
+    return frame_setup.read_at(scene, frame, view_layer, registry.of(scene).traits)
+
+
+def requests_of(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+    """Return all maps that a frame needs."""
+    return registry.of(scene).map_requests(scene, frame)
+
+
+def requests_at(scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None) -> list[MapRequest]:
+    """Return all maps that any frame needs; the scene is at its current frame afterwards."""
+    layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
+    return requests_of(scene, read_at(scene, frame, layer))
+
+
+def _requests_later(scene: bpy.types.Scene, view_layer_name: str | None) -> baking.RequestsAt:
+    """Return a function that returns a frame's requests, however long it is kept."""
+    uid, name = scene.session_uid, scene.name
+
+    def requests(frame: int) -> list[MapRequest]:
+        found = scene_of(uid)
+        if found is None:
+            raise SceneError(f'Scene "{name}" is gone: baking has stopped.')
+        return requests_at(found, frame, view_layer_name)
+
+    return requests
+
+
+def bake(
+    scene: bpy.types.Scene, frames: Iterable[int], view_layer_name: str | None = None
+) -> Generator[baking.Progress, None, baking.Summary]:
+    """Bake the maps of some frames, those that are missing or not valid, and show them.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    frames : iterable of int
+        Frames in the order of baking.
+    view_layer_name : str, optional
+        The view layer whose objects count; the first that is rendered by default.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        As one sentence, which names the frame where there are several.
+    """
+    return _bake(scene.session_uid, list(frames), _requests_later(scene, view_layer_name))
+
+
+def _bake(uid: int, frames: list[int], requests: baking.RequestsAt) -> Generator[baking.Progress, None, baking.Summary]:
+    summary = yield from baking.bake_frames(frames, requests)
+    scene = scene_of(uid)
+    if scene is not None:
+        output = registry.of(scene)
+        output.refresh(scene)
+        output.forget_loaded_maps(scene)
+    return summary
+
+
+def examine(
+    scene: bpy.types.Scene, frames: Iterable[int], view_layer_name: str | None = None, *, thorough: bool = True
+) -> Generator[baking.Progress, None, cache.Listing]:
+    """Find out what the map of each frame is; see `cache.examine`."""
+    return _with_names(scene, functools.partial(cache.examine, thorough=thorough), frames, view_layer_name)
+
+
+def clean(
+    scene: bpy.types.Scene,
+    frames: Iterable[int],
+    view_layer_name: str | None = None,
+    *,
+    everything: bool = False,
+    dry_run: bool = False,
+) -> Generator[baking.Progress, None, cache.Cleaning]:
+    """Remove maps that are not valid, or all; see `cache.clean`."""
+    work = functools.partial(cache.clean, everything=everything, dry_run=dry_run)
+    return _with_names(scene, work, frames, view_layer_name)
+
+
+def _with_names(scene: bpy.types.Scene, work: Any, frames: Iterable[int], view_layer_name: str | None) -> Any:
+    names = cache.FolderNames(scene, frame_setup.active_hole(scene).name)
+    return work(list(frames), _requests_later(scene, view_layer_name), names)

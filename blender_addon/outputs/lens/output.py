@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Output: Cycles Lens, as the rest of the add-on knows it."""
+
+import bpy
+
+from ...bake.request import EXIT_MAP, MapRequest, request
+from ...core import messages
+from ...core.errors import SceneError
+from ...core.session import SESSION, Life
+from ...scene import frame_setup
+from ...scene.frame_setup import FrameSetup
+from ...settings.hole_properties import CAMERA_ANIMATION
+from ..protocol import FrameCarrier, Look, Notice, Output
+from ..shared import disk_sync, leaving
+from ..shared.compositor_tree import find_tree
+from ..shared.look import look_of_scene, write_to_scene
+from ..shared.tree_editing import check_shared
+from . import foreground, lens_camera, lens_disk, lens_objects, lens_shader, lens_sync, lens_tree, panel
+from .carrier import LensCarrier
+
+# The device of a scene that is rendered on the CPU in place of a GPU, to be set back.
+_devices = SESSION.per_scene(str, Life.FILE)
+
+NO_MAPS = "The lens traces its rays itself (Rays: No Bake): there is no map to check."
+
+
+class LensOutput(Output):
+    """The camera's own rays are bent by its shader."""
+
+    identifier = "CYCLES_LENS"
+    number = 1
+    label = "Cycles Lens"
+    description = "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole"
+    traits = lens_sync.TRAITS
+    settings_label = "Lens"
+
+    # --- setting a scene up -----------------------------------------------------------------------
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        """Refuse another engine than Cycles, a Cycles without OSL, and cameras that cannot be converted."""
+        lens_sync.check(scene)
+        tree = find_tree(scene)
+        if tree is not None and disk_sync.wanted_hole(scene) is not None:
+            check_shared(scene, tree)
+        lens_sync.check_camera(scene)
+        for camera in lens_camera.cameras_of(scene):
+            lens_camera.check(camera)
+        lens_shader.bytecode(uses_map=False)
+
+    def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
+        """Convert the scene's cameras."""
+        write_to_scene(scene, look)
+        for camera in lens_camera.cameras_of(scene):
+            lens_camera.convert(camera)
+        return []
+
+    def remove(self, scene: bpy.types.Scene) -> None:
+        """Make the cameras what they were, and take disk and foreground out of the compositor."""
+        lens_disk.take_out(scene)
+        foreground.remove(scene)
+        for camera in lens_camera.cameras_of(scene):
+            lens_camera.restore(camera)
+
+    def look(self, scene: bpy.types.Scene) -> Look:
+        """Return the scene's own settings."""
+        return look_of_scene(scene)
+
+    def marks(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the compositor was left, and not for another output."""
+        return leaving.is_left(scene)
+
+    def refresh(self, scene: bpy.types.Scene) -> None:
+        """Let the viewport see the scene as it stands."""
+        lens_sync.show_live(scene)
+
+    def refresh_disk(self, scene: bpy.types.Scene) -> None:
+        """Put the disk over the lens's picture, or take it out."""
+        lens_disk.refresh(scene)
+
+    # --- rendering --------------------------------------------------------------------------------
+
+    def is_in_use(self, scene: bpy.types.Scene) -> bool:
+        """Return True: the camera itself is the lens."""
+        return True
+
+    def uses_compositor(self, scene: bpy.types.Scene) -> bool:
+        """Return whether disk or foreground are in the compositor."""
+        return lens_tree.BEFORE in scene
+
+    def needs_maps(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the lens looks its rays up, or its disk has passes."""
+        return lens_sync.uses_maps(scene) or lens_disk.is_in_use(scene)
+
+    def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+        """Return the frame's exit map, and the warp map whose passes are drawn."""
+        needed = [_exit_map(scene, frame)] if lens_sync.uses_maps(scene) else []
+        if frame.parameters.disk is not None and lens_disk.is_in_use(scene):
+            needed.append(lens_disk.request_of(scene, frame))
+        return needed
+
+    def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
+        """Return the frame's exit map."""
+        if not lens_sync.uses_maps(scene):
+            raise SceneError(NO_MAPS)
+        return _exit_map(scene, frame)
+
+    def begin_render(self, scene: bpy.types.Scene) -> None:
+        """Refuse what cannot be rendered; render on the CPU where the GPU cannot run the shader."""
+        lens_sync.check(scene)
+        problem = lens_shader.device_problem(scene)
+        if problem is not None:
+            if not scene.umbra.cpu_fallback:
+                raise SceneError(problem)
+            messages.warn(f"{problem} This render is made on the CPU.")
+            _devices.put(scene, scene.cycles.device)
+            scene.cycles.device = "CPU"
+
+    def take_away(self, scene: bpy.types.Scene) -> None:
+        """Let neither camera nor disk show anything."""
+        lens_sync.break_camera(scene)
+        lens_disk.point_at_nothing(scene)
+
+    def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
+        """Give the camera the frame's parameters and its map."""
+        if lens_disk.is_in_use(scene):
+            disk_sync.check_shot(scene, frame.parameters)
+            lens_disk.point_at_passes(scene)
+        warnings = lens_objects.warnings(scene, depsgraph, frame)
+        if scene.umbra.foreground_scene is not None:
+            foreground.copy_lens(scene.umbra.foreground_scene, scene.camera.evaluated_get(depsgraph).data)
+        path = _exit_map(scene, frame).path if lens_sync.uses_maps(scene) else None
+        lens_sync.show(scene, frame, path)
+        return warnings
+
+    def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
+        """Let the viewport see the scene again, which needs no map."""
+        if canceled:
+            lens_disk.point_at_passes(scene)
+        device = _devices.drop(scene)
+        if device is not None:
+            scene.cycles.device = device
+        lens_sync.show_live(scene)
+
+    def follow(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        """Let the viewport see the scene as it stands now."""
+        lens_sync.show_live(scene, depsgraph)
+
+    # --- files ------------------------------------------------------------------------------------
+
+    def point_at_files(self, scene: bpy.types.Scene) -> None:
+        """Let the disk read the passes of the settings that are saved."""
+        lens_disk.point_at_passes(scene)
+
+    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
+        """Let the disk read the same passes from another folder."""
+        lens_disk.move_passes(scene, blender_folder)
+
+    def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
+        """Let Blender read the passes from their files again."""
+        lens_disk.point_at_passes(scene)
+        lens_disk.forget_loaded_passes(scene)
+
+    def carrier(self, scene: bpy.types.Scene) -> FrameCarrier | None:
+        """Return what carries the camera's parameters into each frame."""
+        return LensCarrier(scene)
+
+    # --- the panel --------------------------------------------------------------------------------
+
+    def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
+        """Say what the picture lacks."""
+        lens_sync.check(scene)
+        found = []
+        problem = lens_shader.device_problem(scene)
+        if problem is not None:
+            found.append(Notice(problem, "INFO" if scene.umbra.cpu_fallback else "ERROR"))
+        found += [Notice(each) for each in lens_objects.warnings(scene, depsgraph, frame)]
+        if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
+            found.append(Notice("The viewport shows the lens without the camera's speed; a render has it."))
+        return found
+
+    def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+        """Draw the lens's settings."""
+        panel.draw(layout, scene)
+
+
+def _exit_map(scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
+    return request(scene, frame, EXIT_MAP, lens_sync.exit_parameters(frame.parameters))

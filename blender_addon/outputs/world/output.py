@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Output: World, as the rest of the add-on knows it."""
+
+import bpy
+
+from ...bake.request import WORLD_MAP, MapRequest, request
+from ...core.errors import SceneError
+from ...core.physics_api import physics, world_map
+from ...scene.frame_setup import FrameSetup, Traits
+from ..protocol import Look, Notice, Output
+from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
+from . import lensed_world, panel, world_sync
+from .live import WorldLiveMap
+
+ANOTHER_WORLD = 'Scene "{}" has the output World, but another World was chosen since: set Output: World again.'
+NOT_CHECKED = "Check Accuracy knows no world maps: choose Output: Compositor or Cycles Lens, and bake this frame."
+
+
+class WorldOutput(Output):
+    """The World is looked up along bent rays."""
+
+    identifier = "WORLD"
+    number = 2
+    label = "World"
+    description = "The World itself is bent: in the viewport too, in Cycles and EEVEE, with its light and reflections"
+    traits = Traits(crops=True, any_camera=True)
+    settings_label = "World"
+    follows_preview = True
+    live = WorldLiveMap()
+
+    # --- setting a scene up -----------------------------------------------------------------------
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        """Refuse a scene without a sky that could be lensed."""
+        lensed_world.check(scene)
+
+    def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
+        """Give the scene a lensed copy of its World; the artist's own values stay in one that is there."""
+        is_new = lensed_world.lensed_world(scene) is None
+        node = lensed_world.install(scene)
+        if is_new:
+            write_to_group(node, {name: value for name, value in look.items() if name in CARRIED})
+            if PLACEMENT["Rotation"] in look:
+                lensed_world.place(scene, look[PLACEMENT["Rotation"]], look[PLACEMENT["Strength"]])
+        return []
+
+    def remove(self, scene: bpy.types.Scene) -> None:
+        """Put the World back that was there."""
+        lensed_world.remove(scene)
+
+    def look(self, scene: bpy.types.Scene) -> Look:
+        """Return the values of the group's inputs, and how the sky's image is placed."""
+        node = self.look_node(scene)
+        inputs = {} if node is None else look_of_group(node)
+        placed = {PLACEMENT[name]: value for name, value in lensed_world.placement(scene).items()}
+        return {name: value for name, value in (inputs | placed).items() if name in CARRIED}
+
+    def marks(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene has a World to put back."""
+        return lensed_world.IS_BENT in scene
+
+    def refresh(self, scene: bpy.types.Scene) -> None:
+        """Carry the scene's settings into the lensed World."""
+        if scene.library is None:
+            world_sync.refresh(scene)
+
+    # --- rendering --------------------------------------------------------------------------------
+
+    def is_in_use(self, scene: bpy.types.Scene) -> bool:
+        """Return True: the World is in every picture."""
+        return True
+
+    def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+        """Return the frame's world map."""
+        return [request(scene, frame, WORLD_MAP, world_map.world_parameters(frame.parameters))]
+
+    def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
+        """Refuse: world maps have no pixels of a picture."""
+        raise SceneError(NOT_CHECKED)
+
+    def take_away(self, scene: bpy.types.Scene) -> None:
+        """Let the World read no map, and refuse one that is not the lensed one any more."""
+        world_sync.point_at_nothing(scene)
+        check_world(scene)
+
+    def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
+        """Let the World read the frame's map."""
+        (wanted,) = self.map_requests(scene, frame)
+        _check_resolved(wanted, frame)
+        world_sync.point_at_files(scene)
+        world_sync.forget_loaded_map(scene)
+        return _warnings(scene, frame)
+
+    # --- files ------------------------------------------------------------------------------------
+
+    def point_at_files(self, scene: bpy.types.Scene) -> None:
+        """Let the World read the maps of the settings that are saved."""
+        if scene.library is None:
+            world_sync.point_at_files(scene)
+
+    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
+        """Let the World read the same files from another folder."""
+        world_sync.move_map_path(scene, blender_folder)
+
+    def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
+        """Let Blender read the maps from their files again."""
+        world_sync.forget_loaded_map(scene)
+
+    # --- the panel --------------------------------------------------------------------------------
+
+    def look_node(self, scene: bpy.types.Scene) -> bpy.types.Node | None:
+        """Return the node of the group in the lensed World."""
+        return lensed_world.group_node(lensed_world.lensed_world(scene))
+
+    def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
+        """Say what hides the World."""
+        found = []
+        try:
+            check_world(scene)
+        except SceneError as error:
+            found.append(Notice(str(error), "ERROR"))
+        return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
+
+    def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+        """Draw the sky and the World's group."""
+        panel.draw(layout, scene)
+
+
+def check_world(scene: bpy.types.Scene) -> None:
+    """Refuse a scene whose World is not the lensed one any more.
+
+    Raises
+    ------
+    SceneError
+        If another World was chosen, or a view layer has one of its own.
+    """
+    if lensed_world.lensed_world(scene) is None:
+        raise SceneError(ANOTHER_WORLD.format(scene.name))
+    for layer in scene.view_layers:
+        if layer.use and getattr(layer, "world_override", None) is not None:
+            raise SceneError(
+                f'View layer "{layer.name}" has a World Override, which hides the lensed World: clear it in View Layer '
+                "Properties, or choose another output."
+            )
+
+
+def _check_resolved(wanted: MapRequest, frame: FrameSetup) -> None:
+    unresolved = wanted.kind.format.read_metadata(wanted.path)["counts"]["unresolved"]
+    if unresolved:
+        label = physics.METHODS[frame.parameters.method].label
+        raise SceneError(
+            f"Frame {frame.frame}: {unresolved} rays of the world map could not be resolved by the method "
+            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
+        )
+
+
+def _warnings(scene: bpy.types.Scene, frame: FrameSetup) -> list[str]:
+    """What a render of a frame leaves out, in sentences."""
+    found = []
+    if scene.render.film_transparent:
+        found.append("Film > Transparent is on: the camera does not see the World.")
+    if frame.parameters.disk is not None:
+        found.append(
+            f'The disk of "{frame.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.'
+        )
+    return found

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators have in common: errors become reports."""
+
+from collections.abc import Callable, Iterable
+from functools import wraps
+
+import bpy
+
+from ..core.physics_api import physics
+from ..scene import frame_setup
+
+TIMER_INTERVAL = 0.02  # seconds between steps of work that runs beside the interface
+
+
+def reporting(execute: Callable) -> Callable:
+    """Turn the sentences of errors into the operator's report."""
+
+    @wraps(execute)
+    def guarded(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+        try:
+            return execute(self, context)
+        except physics.BlackHoleError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    return guarded
+
+
+def report_notes(operator: bpy.types.Operator, notes: Iterable[str]) -> None:
+    """Report what the artist should know."""
+    for note in notes:
+        operator.report({"WARNING"}, note)
+
+
+def only_one_is_rendered(scene: bpy.types.Scene) -> str:
+    """Return the warning about a scene with several holes."""
+    return (
+        f'The scene contains {len(frame_setup.holes(scene))} black holes, and one can be rendered: "'
+        f'{scene.umbra.active_hole.name}". Choose another one in the Umbra panel.'
+    )
