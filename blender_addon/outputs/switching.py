@@ -13,7 +13,7 @@ from .refreshing import refresh_disk
 from .shared import leaving
 from .shared.look import look_of_scene, write_to_scene
 
-# On the scene: the output that it is set up for. Files of 0.1.0 lack it.
+# On the scene: the output that it is set up for, if that is not the default one. Files of 0.1.0 lack it.
 INSTALLED = "umbra_output"
 
 
@@ -43,11 +43,18 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
         else:
             notes = new.install(scene, look)
         scene.umbra.output = wanted
-        scene[INSTALLED] = wanted
+        _remember(scene, new)
     new.refresh(scene)
     refresh_disk(scene)
     changes.notify(Change.SWITCHED, scene)
     return notes
+
+
+def _remember(scene: bpy.types.Scene, output: Output) -> None:
+    if output is not registry.default():
+        scene[INSTALLED] = output.identifier
+    elif INSTALLED in scene:
+        del scene[INSTALLED]
 
 
 def _replace(scene: bpy.types.Scene, old: Output, new: Output, look: Look) -> list[str]:
@@ -59,6 +66,8 @@ def _replace(scene: bpy.types.Scene, old: Output, new: Output, look: Look) -> li
     except Exception:
         new.remove(scene)
         old.install(scene, look)
+        old.refresh(scene)
+        old.refresh_disk(scene)
         raise
 
 

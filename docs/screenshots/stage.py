@@ -195,8 +195,8 @@ def baking() -> Steps:
     yield from choose_tab()
     with at():
         bpy.ops.umbra.bake_animation("INVOKE_DEFAULT")
-    operators = sys.modules[f"{PACKAGE}.operators"]
-    while operators.running.fraction < BAKED:
+    operators = sys.modules[f"{PACKAGE}.ui.bake_operators"]
+    while operators.running().fraction < BAKED:
         yield WAIT
     return sidebar_rectangle(), True
 

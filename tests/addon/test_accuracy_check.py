@@ -85,7 +85,7 @@ def test_without_a_map_it_says_what_to_do(scene: bpy.types.Scene) -> None:
 def test_it_stops_when_asked(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene) -> None:
     """The operator in a window draws a step at a time from this; closing it ends the work."""
     bpy.ops.umbra.bake_frame()
-    steps = addon_module("ui.accuracy_check").check_frame(scene.name)
+    steps = addon_module("ui.accuracy_check").check_frame(scene)
     fractions = [next(steps).fraction, next(steps).fraction]
     assert 0.0 <= fractions[0] < fractions[1] < 1.0
     steps.close()

@@ -170,7 +170,7 @@ def test_a_full_disk(
 ) -> None:
     add_hole(scene)
     usage = SimpleNamespace(total=10, used=10, free=1000)
-    monkeypatch.setattr(addon_module("bake.maps").shutil, "disk_usage", lambda _path: usage)
+    monkeypatch.setattr(addon_module("bake.folder").shutil, "disk_usage", lambda _path: usage)
     with pytest.raises(RuntimeError, match=r"disk of the warp map folder .* is full"):
         bpy.ops.umbra.bake_frame()
     assert not maps_in(tmp_path)
@@ -182,7 +182,7 @@ def test_steps_yield_often_and_leave_the_scene_at_its_frame(
     add_hole(scene)
     move_camera(scene)
     scene.frame_set(2)
-    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("outputs.frames").bake(scene, [1, 2, 3])
     fractions = []
     for progress in steps:
         assert scene.frame_current == 2
@@ -197,7 +197,7 @@ def test_closing_the_generator_cancels_and_keeps_finished_maps(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     add_hole(scene)
-    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("outputs.frames").bake(scene, [1, 2, 3])
     while next(steps).frame == 1:
         pass
     steps.close()
@@ -206,9 +206,12 @@ def test_closing_the_generator_cancels_and_keeps_finished_maps(
 
 def test_a_scene_that_vanishes_ends_the_bake(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
     add_hole(scene)
-    steps = addon_module("bake.baking").bake_frames(scene.name, [1, 2, 3])
+    steps = addon_module("outputs.frames").bake(scene, [1, 2, 3])
     next(steps)
     scene.name = "Renamed"
+    next(steps)  # a new name is no reason to stop
+    bpy.data.scenes.new("Another")
+    bpy.data.scenes.remove(scene)
     with pytest.raises(addon_module("core.errors").SceneError, match='"Scene" is gone'):
         list(steps)
 
@@ -237,7 +240,7 @@ class Window:
 @pytest.fixture
 def modal(addon_module: Callable[[str], ModuleType]) -> SimpleNamespace:
     """The operator's methods on a stand-in, because Blender makes operators only in windows."""
-    operators = addon_module("ui.operators")
+    operators = addon_module("ui.bake_operators")
     reports: list[tuple[set[str], str]] = []
 
     class Stand(operators.BakeOperator):
@@ -258,7 +261,7 @@ def test_modal_bake(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespa
     add_hole(scene)
     window = Window(scene)
     assert modal.operator._begin(window) == {"RUNNING_MODAL"}
-    assert modal.module.running is not None
+    assert modal.module.running() is not None
     assert not bpy.ops.umbra.bake_frame.poll()
     assert modal.operator.modal(window, MOUSE) == {"PASS_THROUGH"}  # the interface stays usable
     while (result := modal.operator.modal(window, TIMER)) == {"PASS_THROUGH"}:
@@ -266,7 +269,7 @@ def test_modal_bake(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespa
     assert result == {"FINISHED"}
     assert len(maps_in(tmp_path)) == 3
     assert modal.reports[-1][1].startswith("Baked 3 warp maps")
-    assert modal.module.running is None
+    assert modal.module.running() is None
     assert window.removed == 1
     assert window.status is None
 
@@ -277,7 +280,7 @@ def test_modal_escape(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNames
     modal.operator._begin(window)
     modal.operator.modal(window, TIMER)
     assert modal.operator.modal(window, ESCAPE) == {"CANCELLED"}
-    assert modal.module.running is None
+    assert modal.module.running() is None
     assert not maps_in(tmp_path)
     assert "stopped" in modal.reports[-1][1]
 
@@ -292,7 +295,7 @@ def test_modal_error(scene: bpy.types.Scene, modal: SimpleNamespace) -> None:
     assert result == {"CANCELLED"}
     assert modal.reports[-1][0] == {"ERROR"}
     assert "orthographic" in modal.reports[-1][1]
-    assert modal.module.running is None
+    assert modal.module.running() is None
 
 
 def test_the_panel_tells_the_state(
@@ -301,7 +304,7 @@ def test_the_panel_tells_the_state(
     status = addon_module("ui.status")
 
     def text() -> str:
-        status._counted.clear()
+        status._counts.clear()
         return " ".join(line.text for line in status.lines(bpy.context))
 
     assert "no black hole" in text()

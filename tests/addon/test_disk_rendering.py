@@ -51,13 +51,13 @@ def expected_picture(
     frame: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The picture by numpy in float64, and the light of the disk in it."""
-    modules, maps, shot = addon_module("core.physics_api"), addon_module("bake.maps"), addon_module("scene.frame_setup")
+    modules = addon_module("core.physics_api")
     settings = scene.umbra.active_hole.umbra.disk
     frame = scene.frame_current if frame is None else frame
-    parameters = shot.read_at(scene, frame).parameters
-    path = maps.map_path(scene, scene.umbra.active_hole.name, parameters.map_size, frame)
+    (wanted,) = addon_module("outputs.frames").requests_at(scene, frame)
+    path = wanted.path
     physics = modules.physics
-    passes = [physics.read_disk_pass(each) for each in maps.pass_paths(path, parameters)]
+    passes = [physics.read_disk_pass(each) for each in wanted.passes]
     look = addon_module("settings.disk_properties").look_of(settings)
     texture = addon_module("nodes.disk_images").streaks() if texture is None else texture
     time = frame * settings.turning_speed * scene.render.fps_base / scene.render.fps
@@ -280,7 +280,7 @@ def test_a_spin_that_cannot_be_followed_is_refused(
         animation.nla_tracks.new().strips.new("Spin", 1, animation.action)
         animation.action = None
     scene.frame_set(1)
-    addon_module("outputs.shared.disk_sync").refresh(scene)
+    addon_module("outputs.refreshing").refresh_disk(scene)
     parameters = addon_module("scene.frame_setup").read_at(scene, 3).parameters
     with pytest.raises(addon_module("core.errors").SceneError, match=r"driver|cannot follow"):
         addon_module("outputs.shared.disk_sync").check_shot(scene, parameters)

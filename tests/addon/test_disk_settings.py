@@ -51,8 +51,8 @@ def test_passes_lie_beside_the_map_and_hold(
         one = physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
         assert one.metadata["crossing"] == number
         assert one.metadata["hash"] == warp_map.metadata["hash"]
-    maps = addon_module("bake.maps")
-    assert maps.count_baked(scene, hole.name, (48, 27), range(1, 5)) == 1
+    (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
+    assert addon_module("bake.check").count_baked(scene, hole.name, wanted, range(1, 5)) == 1
 
 
 @pytest.mark.parametrize(
@@ -102,21 +102,21 @@ def test_a_spoilt_pass_makes_the_frame_stale(
     number: int,
     spoil: Callable[[Path], None],
 ) -> None:
-    maps, shot = addon_module("bake.maps"), addon_module("scene.frame_setup")
+    fault_of = addon_module("bake.check").fault_of
     bake()
     scene.camera.location.x += 1.0
     scene.frame_set(2)
     bake()
     scene.camera.location.x -= 1.0
     scene.frame_set(1)
-    path = tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr"
-    parameters = shot.read_at(scene, 1).parameters
-    assert maps.fault_of(path, parameters) is None
+    (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
+    assert wanted.path == tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr"
+    assert fault_of(wanted) is None
     spoil(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
-    fault = maps.fault_of(path, parameters)
+    fault = fault_of(wanted)
     assert f"disk{number}" in fault
     bake()
-    assert maps.fault_of(path, parameters) is None
+    assert fault_of(wanted) is None
 
 
 def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
@@ -338,7 +338,7 @@ def test_light_goes_with_its_hole(
     hole.umbra.disk.light = True
     assert addon_module("outputs.shared.disk_light").find(hole) is not None
     bpy.data.objects.remove(hole)
-    addon_module("outputs.shared.disk_sync").refresh(scene)
+    addon_module("outputs.refreshing").refresh_disk(scene)
     assert not any("umbra_disk_light" in each for each in bpy.data.objects)
     assert not addon_module("outputs.shared.compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
 

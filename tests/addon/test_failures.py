@@ -123,9 +123,8 @@ def test_with_a_window_the_picture_is_magenta(
     exr = addon_module("core.physics_api").exr
     good = render(scene, tmp_path / "good.exr", exr)
     shown: list[str] = []
-    handlers = addon_module("render.handlers")
     monkeypatch.setattr(addon_module("core.messages"), "popup", shown.append)
-    monkeypatch.setattr(handlers, "without_window", lambda: False)
+    monkeypatch.setattr(addon_module("core.messages"), "without_window", lambda: False)
     hole.scale = (1.0, 1.0, 2.0)
     picture = render(scene, tmp_path / "bad.exr", exr)
     assert len(shown) == 1

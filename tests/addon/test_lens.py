@@ -246,7 +246,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
     hole.rotation_euler = (0.2, -0.3, 0.5)
     scene.umbra.lens_rays = rays
     picture = render(scene, tmp_path / "directions.exr", exr)[..., :3].astype(float) - 1.0
-    warp_map = physics.bake(addon_module("scene.frame_setup").read_at(scene, scene.frame_current).parameters)
+    warp_map = physics.bake(addon_module("outputs.frames").read_at(scene, scene.frame_current).parameters)
     clear = warp_map.visibility == 1.0
     for _ in range(2):
         grown = clear.copy()
@@ -278,7 +278,7 @@ def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon
     scene.umbra.lens_rays, scene.umbra.sky_temperature = rays, 5000.0
     scene.umbra.redshift_color, scene.umbra.redshift_brightness = 0.7, 1.0
     picture = render(scene, tmp_path / "shifted.exr", exr)[..., :3]
-    warp_map = physics.bake(addon_module("scene.frame_setup").read_at(scene, scene.frame_current).parameters)
+    warp_map = physics.bake(addon_module("outputs.frames").read_at(scene, scene.frame_current).parameters)
     clear = warp_map.visibility == 1.0
     gain = color.redshift_gain(warp_map.one_plus_z[clear].astype(float), 0.7, 1.0, 5000.0)
     expected = gain * np.array([0.8, 0.5, 0.2])

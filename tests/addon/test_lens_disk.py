@@ -50,15 +50,10 @@ def expected_picture(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType], behind: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The disk of the current frame over a picture, by numpy in float64, and the light of the disk in it."""
-    modules, maps, disk = (
-        addon_module("core.physics_api"),
-        addon_module("bake.maps"),
-        addon_module("outputs.lens.lens_disk"),
-    )
+    modules, disk = addon_module("core.physics_api"), addon_module("outputs.lens.lens_disk")
     settings = scene.umbra.active_hole.umbra.disk
-    frame = addon_module("scene.frame_setup").read_at(scene, scene.frame_current)
-    paths = maps.pass_paths(disk.path_of(scene, frame), frame.parameters)
-    passes = [modules.physics.read_disk_pass(each) for each in paths]
+    frame = addon_module("outputs.frames").read_at(scene, scene.frame_current)
+    passes = [modules.physics.read_disk_pass(each) for each in disk.request_of(scene, frame).passes]
     time = scene.frame_current * settings.turning_speed * scene.render.fps_base / scene.render.fps
     look, texture = (
         addon_module("settings.disk_properties").look_of(settings),
@@ -311,19 +306,19 @@ def test_what_is_not_drawn_right_is_named(scene, addon_module) -> None:
 def test_verify_and_clean_know_the_disks_map_beside_the_exit_map(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    cache, baking = addon_module("bake.cache"), addon_module("bake.baking")
+    frames, baking = addon_module("outputs.frames"), addon_module("bake.baking")
     add_hole(scene)
     assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
-    listing = baking.drain(cache.examine(scene.name, [scene.frame_current]))
+    listing = baking.drain(frames.examine(scene, [scene.frame_current]))
     assert listing.complete
-    folder = addon_module("bake.maps").folder(scene).path
+    folder = addon_module("bake.folder").folder(scene).path
     (disk,) = [each for each in folder.glob("*.exr") if "_exit_" not in each.name and "_disk" not in each.name]
     assert listing.frames[0].size == sum(each.stat().st_size for each in folder.glob("*.exr"))
     disk.write_bytes(disk.read_bytes()[:-100])
-    listing = baking.drain(cache.examine(scene.name, [scene.frame_current]))
+    listing = baking.drain(frames.examine(scene, [scene.frame_current]))
     assert not listing.complete
     assert listing.frames[0].path == disk
-    removed = baking.drain(cache.clean(scene.name, [scene.frame_current])).removed
+    removed = baking.drain(frames.clean(scene, [scene.frame_current])).removed
     assert [each.path for each in removed] == [disk]
     assert list(folder.glob("*_exit_*.exr"))
 
@@ -346,12 +341,16 @@ def test_strips_that_move_the_look_are_refused(
     strip = animation.nla_tracks.new().strips.new("Look", 1, action)
     strip.action_slot = animation.action_slot
     animation.action = None
-    frame = addon_module("scene.frame_setup").read_at(scene, 1)
+    frame = addon_module("outputs.frames").read_at(scene, 1)
     with pytest.raises(addon_module("core.errors").SceneError, match="strips of the Nonlinear Animation"):
         addon_module("outputs.shared.disk_sync").check_shot(scene, frame.parameters)
 
 
-def test_names_that_look_like_an_exit_maps(addon_module: Callable[[str], ModuleType]) -> None:
-    maps = addon_module("bake.maps")
-    assert maps.kind_of(Path("Airlock_exit_corridor_Hole_64x36_0001.exr")) is maps.WARP_MAP
-    assert maps.kind_of(Path("Scene_Hole_64x36_0001_exit_0123456789ab.exr")) is maps.EXIT_MAP
+def test_names_that_look_like_an_exit_maps(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
+    request = addon_module("bake.request")
+    scene.name = "Airlock_exit_corridor"
+    pattern = request.name_pattern(scene, "Hole")
+    warp_map = pattern.fullmatch("Airlock_exit_corridor_Hole_64x36_0001.exr")
+    exit_map = pattern.fullmatch("Airlock_exit_corridor_Hole_64x36_0001_exit_0123456789ab.exr")
+    assert request.kind_of(warp_map) is request.WARP_MAP
+    assert request.kind_of(exit_map) is request.EXIT_MAP

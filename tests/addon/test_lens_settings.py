@@ -71,7 +71,7 @@ def test_objects_inside_the_sphere_are_named(scene, addon_module) -> None:
     ball.name = "Probe"
     add_lens(scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    frame = addon_module("scene.frame_setup").read(scene, depsgraph)
+    frame = addon_module("outputs.frames").read(scene, depsgraph)
     (sentence,) = addon_module("outputs.lens.lens_objects").warnings(scene, depsgraph, frame)
     assert sentence.startswith('"Probe" reaches into the lens sphere')
 

@@ -174,14 +174,15 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     scene, baking, modules = bpy.context.scene, addon_module("bake.baking"), addon_module("core.physics_api")
-    path, parameters = baking.maps_at(scene, 1)[0]
+    (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
+    path = wanted.path
     claim = claim_elsewhere(path, addon_module("bake.claim"))
     waits = []
 
     def other_machine(_seconds: float) -> None:
         waits.append(path.exists())
         if len(waits) == 3:
-            for _ in baking.bake_map(path, parameters):
+            for _ in baking.bake_map(wanted):
                 pass
             claim.unlink()
 
@@ -202,7 +203,7 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
 def test_a_render_that_waits_can_be_stopped(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    path, _parameters = addon_module("bake.baking").maps_at(bpy.context.scene, 1)[0]
+    path = addon_module("outputs.frames").requests_at(bpy.context.scene, 1)[0].path
     claim_elsewhere(path, addon_module("bake.claim"))
     render = f"bpy.ops.wm.open_mainfile(filepath={blend!r}); bpy.ops.render.render(animation=True)"
     with start_python(render) as process:
@@ -219,11 +220,11 @@ def test_a_bake_does_other_frames_first_and_then_waits(
     blend: str, addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, baking = bpy.context.scene, addon_module("bake.baking")
-    path, _parameters = baking.maps_at(scene, 1)[0]
+    path = addon_module("outputs.frames").requests_at(scene, 1)[0].path
     claim = claim_elsewhere(path, addon_module("bake.claim"))
     monkeypatch.setattr(baking, "POLL", 2 * baking.WAIT)
     texts = []
-    for progress in baking.bake_frames(scene.name, [1, 2, 3]):
+    for progress in addon_module("outputs.frames").bake(scene, [1, 2, 3]):
         texts.append(progress.text if progress.outcome is None else f"{progress.frame} {progress.outcome}")
         if "waiting" in progress.text and claim.exists():
             claim.unlink()  # the other machine has given up
@@ -234,9 +235,9 @@ def test_a_bake_does_other_frames_first_and_then_waits(
 def test_a_frame_that_is_being_baked_is_not_cleaned_away(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene, baking, command = bpy.context.scene, addon_module("bake.baking"), addon_module("command.command_line")
+    scene, command = bpy.context.scene, addon_module("command.command_line")
     assert command.run(["bake", "--frames", "1-2"]) == 0
-    path, _parameters = baking.maps_at(scene, 1)[0]
+    path = addon_module("outputs.frames").requests_at(scene, 1)[0].path
     claim = claim_elsewhere(path, addon_module("bake.claim"))
     half = path.with_name(f".{path.stem}.abcdefgh.tmp.exr")
     half.write_bytes(b"half")

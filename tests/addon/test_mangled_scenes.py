@@ -252,7 +252,7 @@ def shows_or_refuses(
     messages = addon_module("core.messages")
     monkeypatch.setattr(messages, "popup", told.append)
     monkeypatch.setattr(messages, "warn", told.append)
-    monkeypatch.setattr(addon_module("render.handlers"), "without_window", lambda: False)
+    monkeypatch.setattr(addon_module("core.messages"), "without_window", lambda: False)
     in_use = addon_module("outputs.shared.compositor_tree").is_in_use(scene)
     try:
         picture = render(scene, path, exr)
@@ -312,7 +312,7 @@ def test_a_mangled_scene_whole_again_shows_the_same_picture(
 ) -> None:
     """All damage to the set-up itself is undone by Set Up Compositor, to the pixel."""
     monkeypatch.setattr(
-        addon_module("render.handlers"), "without_window", lambda: False
+        addon_module("core.messages"), "without_window", lambda: False
     )  # a failure must not end the test
     before = render(scene, tmp_path / "before.exr", exr)
     empty_group(scene, random.Random(0))  # found and mended by the render itself

@@ -47,8 +47,8 @@ noted = []
 
 BAKE = """
 import importlib
-baking = importlib.import_module("bl_ext.user_default.umbra_black_hole.bake.baking")
-for progress in baking.bake_frames(scene.name, range(1, frames + 1)):
+frame_maps = importlib.import_module("bl_ext.user_default.umbra_black_hole.outputs.frames")
+for progress in frame_maps.bake(scene, range(1, frames + 1)):
     if progress.outcome:
         note()
 print(json.dumps(noted))

@@ -21,7 +21,7 @@ def preview(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.Monke
     """The module, as if there were a window; timers do not fire in background, so tests call `settle`."""
     module = addon_module("preview.live_preview")
     module.forget()
-    monkeypatch.setattr(module, "can_run", lambda: not module._suspended)
+    monkeypatch.setattr(module, "can_run", lambda: not module._suspended.now)
     monkeypatch.setattr(module, "SETTLE", 0.0)
     yield module
     module.forget()
@@ -87,7 +87,7 @@ def shown(scene: bpy.types.Scene, world_sync: ModuleType) -> np.ndarray:
 
 def expected(scene: bpy.types.Scene, physics: ModuleType, addon_module) -> np.ndarray:
     """The map as numpy makes it for where the camera is now."""
-    frame = addon_module("scene.frame_setup").read(scene, bpy.context.evaluated_depsgraph_get(), velocity=np.zeros(3))
+    frame = addon_module("outputs.frames").read(scene, bpy.context.evaluated_depsgraph_get(), np.zeros(3))
     draft = replace(frame.parameters, tolerance=1e-4)
     world_map = physics.world_map
     steps = world_map.world_map_steps(world_map.world_parameters(draft, world_map.PREVIEW))
@@ -197,7 +197,7 @@ def test_switched_off_with_the_add_on_it_leaves_worlds_that_read_files(
 def test_the_thumbnail_shows_what_the_camera_sees(scene, preview, thumbnail, physics, tmp_path) -> None:
     """Against a render of the World: both are pictures of the same sky, the thumbnail smaller and for screens."""
     start(scene, preview)
-    small = thumbnail.pixels(scene.name)
+    small = thumbnail.pixels(scene)
     assert small.shape == (108, 192, 4)
     scene.render.resolution_x, scene.render.resolution_y = 192, 108
     picture = render(scene, tmp_path / "picture.exr", physics.exr)
@@ -210,13 +210,13 @@ def test_the_thumbnail_shows_what_the_camera_sees(scene, preview, thumbnail, phy
 @pytest.mark.parametrize("output", ["COMPOSITOR", "CYCLES_LENS"])
 def test_the_thumbnail_needs_no_world_output(scene, preview, thumbnail, output) -> None:
     start(scene, preview, output)
-    before = thumbnail.pixels(scene.name)
+    before = thumbnail.pixels(scene)
     scene.umbra.active_hole.umbra.mass_scale = 0.4
     settle(preview)
-    after = thumbnail.pixels(scene.name)
+    after = thumbnail.pixels(scene)
     assert (after[..., :3].max(axis=-1) == 0.0).sum() > (before[..., :3].max(axis=-1) == 0.0).sum()
     scene.umbra.live_preview = False
-    assert thumbnail.pixels(scene.name) is None
+    assert thumbnail.pixels(scene) is None
 
 
 def test_a_render_reads_files_and_the_preview_comes_back(scene, preview, world_sync, physics, tmp_path) -> None:

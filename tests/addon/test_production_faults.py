@@ -71,7 +71,7 @@ def test_a_disk_that_is_full(
     scene.camera.keyframe_insert("location", frame=60)
     if not foreseen:
         usage = SimpleNamespace(total=10**9, used=0, free=10**9)
-        monkeypatch.setattr(addon_module("bake.maps").shutil, "disk_usage", lambda _path: usage)
+        monkeypatch.setattr(addon_module("bake.folder").shutil, "disk_usage", lambda _path: usage)
     assert run("bake --frames 1-60") == 1
     error = capfd.readouterr().err
     assert "Frame " in error

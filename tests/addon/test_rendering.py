@@ -292,8 +292,8 @@ def test_saving_and_loading(
     add_hole(scene, motion="STATIC")
     scene.umbra.map_folder = "//umbra_maps/"
     picture = render(scene, tmp_path / "before.exr", exr)
-    temporary = Path(bpy.path.abspath(addon_module("bake.maps").folder(scene).blender_path))
-    assert addon_module("bake.maps").folder(scene).is_temporary
+    temporary = Path(bpy.path.abspath(addon_module("bake.folder").folder(scene).blender_path))
+    assert addon_module("bake.folder").folder(scene).is_temporary
     assert len(list(temporary.glob("*.exr"))) >= 1
     blend = tmp_path / "saved" / "file.blend"
     blend.parent.mkdir()

@@ -196,7 +196,7 @@ def test_lensing_is_one_click(scene, physics, tmp_path) -> None:
 def test_without_a_map_the_sky_is_magenta(scene, physics, modules, tmp_path) -> None:
     """As in a Blender without the add-on that lacks the files."""
     switch()
-    handlers = modules("handlers")
+    handlers = modules("render.handlers")
     handlers.unregister()
     try:
         picture = render(scene, tmp_path / "picture.exr", physics.exr)
@@ -353,8 +353,10 @@ def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
     switch()
     render(scene, tmp_path / "picture.exr", physics.exr)
     (path,) = Path(scene.umbra.map_folder).glob("*.exr")
-    assert modules("cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
-    assert modules("maps").kind_of(path).noun == "world map"
+    assert modules("bake.cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
+    request = modules("bake.request")
+    match = request.name_pattern(scene, "Hole").fullmatch(path.name)
+    assert request.kind_of(match) is request.WORLD_MAP
 
 
 def test_a_disk_that_is_not_drawn_is_named(
@@ -362,7 +364,7 @@ def test_a_disk_that_is_not_drawn_is_named(
 ) -> None:
     switch()
     scene.umbra.active_hole.umbra.disk.enabled = True
-    lines = modules("status").lines(bpy.context)
+    lines = modules("ui.status").lines(bpy.context)
     assert "is not drawn by Output: World" in " ".join(line.text for line in lines)
     render(scene, tmp_path / "picture.exr", physics.exr)
     output = capfd.readouterr()
@@ -390,7 +392,7 @@ def test_the_world_again_keeps_the_artists_values(scene: bpy.types.Scene) -> Non
 def test_a_saved_file_reads_the_maps_of_its_hole(scene: bpy.types.Scene, tmp_path: Path, modules: Callable) -> None:
     switch()
     scene.umbra.active_hole.name = "Renamed"
-    modules("world_sync").point_at_nothing(scene)
+    modules("outputs.world.world_sync").point_at_nothing(scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "renamed.blend"))
     (image,) = {node.image for node in group(scene).node_tree.nodes if "umbra_world_map" in node}
     assert "_Renamed_" in image.filepath
@@ -403,8 +405,8 @@ def test_a_world_override_is_refused(scene: bpy.types.Scene, modules: Callable) 
     if not hasattr(layer, "world_override"):
         pytest.skip("view layers of this Blender have no World of their own")
     layer.world_override = bpy.data.worlds.new("Other")
-    with pytest.raises(modules("errors").SceneError, match="World Override"):
-        modules("world_sync").check(scene)
+    with pytest.raises(modules("core.errors").SceneError, match="World Override"):
+        modules("outputs.world.output").check_world(scene)
 
 
 def test_a_farm_looks_for_world_maps(scene: bpy.types.Scene, tmp_path: Path, physics: ModuleType) -> None:
