@@ -156,6 +156,22 @@ def run_python(
     )
 
 
+def refused(result: subprocess.CompletedProcess[str]) -> bool:
+    """Whether a script ended as it does for a frame that cannot be right.
+
+    Raises
+    ------
+    CalledProcessError
+        It failed in any other way.
+    """
+    if result.returncode == 1 and "Error: Umbra Black Hole: " in result.stderr:
+        return True
+    if result.returncode:
+        sys.stderr.write(result.stderr)
+        result.check_returncode()
+    return False
+
+
 def start_python(code: str) -> subprocess.Popen[str]:
     """Start a script as `run_python` does, without waiting for it."""
     return subprocess.Popen(_script(code), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
