@@ -54,7 +54,7 @@ os._exit(0)
     result = run_python(BEGIN.format(folder=str(tmp_path)) + change)
     if refused(result):
         return
-    physics = addon_module("_physics").physics
+    physics = addon_module("core.physics_api").physics
     maps = sorted((tmp_path / "maps").glob("*.exr"))
     places = [physics.read_warp_map_metadata(each)["parameters"]["camera_position"] for each in maps]
     np.testing.assert_allclose(places, [(6.0, -7.0, 5.0), (7.0, -7.0, 5.0)], rtol=1e-6)
