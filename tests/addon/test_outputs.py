@@ -114,7 +114,7 @@ def test_an_output_that_refuses_or_fails_changes_nothing(
         assert bpy.ops.umbra.set_output(output=old) == {"FINISHED"}
     before = state_of(scene)
     setattr(flat, how, True)
-    with pytest.raises(RuntimeError, match="Not here|half-way"):
+    with pytest.raises(RuntimeError, match=r"Not here|half-way"):
         bpy.ops.umbra.set_output(output="FLAT")
     assert state_of(scene) == before
     scene.umbra.output = "FLAT"  # the setting itself, as the panel writes it
