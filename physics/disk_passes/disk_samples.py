@@ -11,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geodesics.radial_path import winding
-from ..geodesics.tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
+from ..geodesics.tracer import DEFAULT_METHOD, Fate
+from ..kerr.critical_curve import position_angles
 from ..kerr.metric import isco_radius
 from ..kerr.orbiting_matter import circular_redshift, redshift_factor
-from ..kerr.rays import Array
-from ..maps.painting import in_circle
-from ..maps.sky_table import position_angles
+from ..numerics.angles import wrap
+from ..numerics.arrays import Array, Index, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..sampling.view import View
 from ..shot.map_parameters import WarpMapParameters
 from .ring_grid import Needs
 from .ring_table import RingTable
 from .ring_tracing import REACH, ring_tables
 
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 Matter = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 """Radius, azimuth in [0, 2 pi) and g."""
 
@@ -189,7 +188,7 @@ class DiskSamples:
     def matter(self, values: NDArray[Any]) -> Matter:
         """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
         azimuth, g = self.azimuth_and_g(values)
-        return 1.0 / values[U], in_circle(azimuth), g
+        return 1.0 / values[U], wrap(azimuth), g
 
     def azimuth_and_g(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return azimuth, unwrapped, and g of places on the disk, from channels of shape (channels, ...)."""

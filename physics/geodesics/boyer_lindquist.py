@@ -14,13 +14,11 @@ import math
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
-
-Mask = NDArray[np.bool_]
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 
 R, THETA, PHI, P_R, P_THETA = range(5)
 

@@ -28,13 +28,11 @@ from abc import ABC, abstractmethod
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 from ..numerics.sphere import spherical_triad
-
-Mask = NDArray[np.bool_]
 
 # Rows of the state: the radial coordinate x, the unit vector n, its derivative n', the extra rotation psi.
 X, N, N_PRIME, PSI = 0, slice(1, 4), slice(4, 7), 7

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..kerr.critical_curve import comes_from_sky
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 from ..numerics.runge_kutta import CASH_KARP, attempt, integrate
 from ..numerics.sphere import spherical_triad
 from .crossings import Crossings
@@ -25,8 +26,6 @@ from .mino import FIRST_ANGLE, radial_polynomial
 from .polar import IN_PLANE
 from .radial_path import HORIZON_MARGIN, winding
 from .tracer import Fate
-
-Mask = NDArray[np.bool_]
 
 # Rows of the state: 1 / r, its derivative, the unit vector n, its derivative, the extra rotation psi, the Mino time.
 U, U_PRIME, N, N_PRIME, PSI, TIME = 0, 1, slice(2, 5), slice(5, 8), 8, 9

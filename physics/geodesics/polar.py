@@ -28,7 +28,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array, Indices, Rays, indices
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Indices, indices
 from ..numerics.sphere import cos_sin, spherical_triad
 from .quadrature import gauss_legendre
 

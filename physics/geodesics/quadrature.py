@@ -24,10 +24,9 @@ from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Indices, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Indices
 from .mino import direct_polynomial, radial_polynomial, turning_polynomial
-
-Index = NDArray[np.intp]
 
 # The rules that are used: rays are sorted into classes by the nodes that they need. At the default tolerance nine of
 # ten need 7 to 10; the others are so few that more classes would cost more than nodes that are not needed.

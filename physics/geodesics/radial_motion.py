@@ -15,18 +15,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Mask
 from ..numerics.weierstrass import QuarticMotion, Weierstrass, acceleration
 from .mino import radial_polynomial
 from .quadrature import gauss_legendre, negative_root
 from .radial_path import TAIL, Places, along_parabola, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
-
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 # Tightest tolerance that is served: where rays part next to the critical curve rounding costs up to 1e-7 of u.
 TIGHTEST = 3e-7

@@ -36,12 +36,10 @@ from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Mask
 from .mino import direct_polynomial, inner_turning_polynomial, turning_polynomial
 from .quadrature import negative_root
-
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 # Chebyshev points that are tried, one number after another; most rays need no more than the first. Few will do where
 # the tolerance is at least this; straight into the hole the integrands are less smooth.

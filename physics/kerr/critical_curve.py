@@ -20,11 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import by_component, cos_sin
 from .metric import check_spin, circular_photon_radius, horizon_radius
 from .observer import Observer
-from .rays import Array, Indices, Rays, rays_from_triad
+from .rays import Rays, rays_from_triad
 
 # Newton's method at most doubles its digits: this many rounds serve any start.
 NEWTON_ROUNDS = 60
@@ -138,6 +139,28 @@ def around_hole(away: Array, aside: Array, up: Array) -> Array:
     position angles with cosine `aside` (theta-hat) and sine `up` (phi-hat)."""
     cosine, sine = cos_sin(away)
     return by_component(-cosine, sine * aside, sine * up)
+
+
+def position_angles(light: Array) -> tuple[Array, Array]:
+    """Return where a FIDO sees light, relative to the hole's direction: the inverse of `around_hole`.
+
+    Parameters
+    ----------
+    light : ndarray, shape (3, n)
+        Where the light runs in the FIDO's frame, on (r-hat, theta-hat, phi-hat).
+
+    Returns
+    -------
+    away : ndarray, shape (n,)
+        Angle from the hole's direction, radians, [0, pi].
+    angle : ndarray, shape (n,)
+        Position angle about the hole's direction, radians, [0, 2 pi].
+    """
+    outward, aside, up = light
+    away: Array = np.arctan2(np.sqrt(aside * aside + up * up), outward)
+    angle = np.arctan2(-up, -aside)
+    angle += (angle < 0.0) * (2.0 * math.pi)
+    return away, angle
 
 
 def edge_angles(

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array
 from .metric import check_spin, horizon_radius, isco_radius
-from .rays import Array
 
 
 def matter_direction(spin: float, retrograde: bool = False) -> float:

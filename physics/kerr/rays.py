@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.sphere import unit_vectors
 from .metric import MetricFunctions, axis_safe_sin, check_spin, metric_functions
 from .observer import Observer
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp] | slice
 
 # Energy at infinity, per energy in the FIDO's frame, that stands for none: its constants of motion stay finite.
 LEAST_ENERGY = 1e-12
@@ -71,11 +69,6 @@ class Rays:
             self.escapes[chosen],
             self.one_plus_z[chosen],
         )
-
-
-def indices(members: NDArray[np.bool_]) -> Indices:
-    """Return the indices of members of shape (n,): a slice where all are, which selects without copying."""
-    return slice(None) if members.all() else np.flatnonzero(members)
 
 
 def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:

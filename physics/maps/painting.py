@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE, trace_block
-from ..kerr.rays import Array
+from ..geodesics.tracer import trace_block
+from ..numerics.angles import wrap_once
+from ..numerics.arrays import Array, Image, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.sphere import celestial_coordinates
-from ..sampling.tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, sides_for, tiles_of
+from ..sampling.tiles import POINTS, TILE_SIDES, Tiles, interpolate, pool, sample, sides_for, tiles_of
 from ..sampling.view import View
 from ..sampling.visibility import CENTER_REACH, cells_for_shadow, center_block, near_edge, refine
 from ..shot.cameras import PanoramaCamera
@@ -34,9 +33,6 @@ TRACED_SIDE = 128
 
 # Points that one chord of the shadow's outline is divided into, at the most.
 MOST_PIECES = 100_000
-
-Image = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 
 class Painting:
@@ -194,7 +190,7 @@ class Painting:
     def _interpolate_group(self, tiles: Tiles, coefficients: Array) -> None:
         x, y, z = interpolate(coefficients, tiles.side, self._view.hole_to_world)
         theta = np.arctan2(np.sqrt(x * x + y * y), z)
-        phi = wrapped(np.arctan2(y, x))
+        phi = wrap_once(np.arctan2(y, x))
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         for plane, values in zip(self.planes, (theta, phi, one_plus_z, np.ones_like(theta)), strict=True):
@@ -228,7 +224,7 @@ class Painting:
             one_plus_z = self._view.one_plus_z(x[pixel], y[pixel])
             place = (rows[pixel], columns[pixel])
             self._theta[place] = np.where(lost, 0.0, theta)
-            self._phi[place] = wrapped(np.where(lost, 0.0, phi))
+            self._phi[place] = wrap_once(np.where(lost, 0.0, phi))
             self._one_plus_z[place] = np.where(lost, UNRESOLVED_ONE_PLUS_Z, one_plus_z)
             self._unresolved += int(np.count_nonzero(lost))
             yield 0.2 + 0.8 * (start + len(pixel)) / len(traced)
@@ -260,34 +256,3 @@ class Painting:
                     block_column[held], block_row[held], self._view.edge, cells_for_shadow(center, self._view.edge)
                 )
         return visibility, x, y
-
-
-def pool(mask: Mask, cells: int) -> Mask:
-    """Return whether any cell is set in each square of `cells` x `cells`."""
-    rows, columns = (-(-size // cells) for size in mask.shape)
-    padded = np.zeros((rows * cells, columns * cells), dtype=bool)
-    padded[: mask.shape[0], : mask.shape[1]] = mask
-    pooled: Mask = padded.reshape(rows, cells, columns, cells).any(axis=(1, 3))
-    return pooled
-
-
-def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
-    """Return angles from -pi to 2 pi brought to [0, 2 pi) in single precision, which rounds some up to 2 pi itself."""
-    turn = 2.0 * math.pi
-    single = (phi + (phi < 0.0) * phi.dtype.type(turn)).astype(np.float32)
-    single *= single < np.float32(turn)
-    return single
-
-
-def in_circle(phi: NDArray[np.floating[Any]]) -> Image:
-    """Return any angles brought to [0, 2 pi) in single precision."""
-    turn = phi.dtype.type(2.0 * math.pi)
-    single = phi.astype(np.float32, copy=False)
-    if single.size and single.min() >= 0.0 and single.max() < np.float32(turn):
-        return single
-    rest = np.floor(phi * (1.0 / turn))
-    rest *= turn
-    np.subtract(phi, rest, out=rest)
-    single = rest.astype(np.float32, copy=False)
-    single[(single < 0.0) | (single >= np.float32(turn))] = 0.0  # by rounding
-    return single

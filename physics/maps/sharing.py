@@ -17,10 +17,10 @@ from collections.abc import Generator
 import numpy as np
 
 from ..disk_passes.disk_pass import DiskPass
-from ..kerr.rays import Array
+from ..numerics.angles import wrap_once
+from ..numerics.arrays import Array
 from ..numerics.sphere import celestial_coordinates, spherical_triad, unit_vectors
 from ..shot.map_parameters import WarpMapParameters
-from .painting import wrapped
 from .sky_table import SkyTable, same_place, sky_table_steps
 from .warp_map import WarpMap, bake_steps
 
@@ -126,7 +126,7 @@ def turned_pass(earlier: DiskPass, azimuth: float, metadata: dict[str, object]) 
     """Return a disk's pass for a camera whose azimuth is larger by `azimuth` radians; everything else stays."""
     seen = earlier.coverage > 0.0
     phi = earlier.phi.copy()
-    phi[seen] = wrapped((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))
+    phi[seen] = wrap_once((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))
     return dataclasses.replace(earlier, phi=phi, metadata={**metadata, "crossing": earlier.metadata["crossing"]})
 
 
@@ -163,8 +163,8 @@ def _rotated(warp_map: WarpMap, rotation: Array, metadata: dict[str, object]) ->
     theta, phi = warp_map.theta.copy(), warp_map.phi.copy()
     turn = math.atan2(rotation[1, 0], rotation[0, 0])
     if np.abs(rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-12:
-        phi[seen] = wrapped((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
+        phi[seen] = wrap_once((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
     else:
         turned_theta, turned_phi = celestial_coordinates(unit_vectors(theta[seen], phi[seen]) @ rotation.T)
-        theta[seen], phi[seen] = turned_theta, wrapped(turned_phi)
+        theta[seen], phi[seen] = turned_theta, wrap_once(turned_phi)
     return WarpMap(theta, phi, warp_map.one_plus_z, warp_map.visibility, metadata)

@@ -22,10 +22,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE, Fate, trace_block
-from ..kerr.critical_curve import all_around, around_hole, edge_angles
+from ..geodesics.tracer import Fate, trace_block
+from ..kerr.critical_curve import all_around, around_hole, edge_angles, position_angles
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, rays_from_triad
+from ..kerr.rays import rays_from_triad
+from ..numerics.angles import circle_steps
+from ..numerics.arrays import Array
+from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.interpolation import CUBIC_ERROR, CUBIC_POINTS, lagrange_weights
 from ..numerics.sphere import by_component
 from ..shot.map_parameters import WarpMapParameters
 
@@ -37,9 +41,7 @@ CLOSEST = 1e-3
 
 # Points of the interpolation, counted from the one before the place. Half way between, four leave out 3/128 of the
 # fourth difference, six 5/1024 of the sixth.
-AROUND = (-1, 0, 1, 2)
 ALONG = (-2, -1, 0, 1, 2, 3)
-AROUND_ERROR = 3.0 / 128.0
 ALONG_ERROR = 5.0 / 1024.0
 # Share of the tolerance that each of the two coordinates, and the edge's place, may use up.
 ERROR_SHARE = 0.1
@@ -89,7 +91,7 @@ class SkyTable:
         """`first`: s of the first place served; `edge`, shape (angles,); `values`, shape (3, angles, count)."""
         self._place = place
         self._first = first
-        around = np.arange(AROUND[0], ANGLES + AROUND[-1]) % ANGLES  # psi is a circle
+        around = np.arange(CUBIC_POINTS[0], ANGLES + CUBIC_POINTS[-1]) % ANGLES  # psi is a circle
         self._edge = edge[around]
         self._values = [np.ascontiguousarray(each[around]).ravel() for each in values]
         self._count = values.shape[2]
@@ -105,8 +107,8 @@ class SkyTable:
         NaN where the table has no answer: in the shadow, next to its edge, and where interpolation is not good enough.
         """
         away, angle = position_angles(light)
-        row, part = angle_steps(angle, ANGLES)
-        across = lagrange_weights(part, AROUND)
+        row, part = circle_steps(angle, ANGLES)
+        across = lagrange_weights(part, CUBIC_POINTS)
         edge = sum(weight * self._edge.take(row + i) for i, weight in enumerate(across))
         delta = away - edge
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -159,48 +161,11 @@ def _served(values: Array, edge: Array, delta: Array, error: float) -> NDArray[n
     angles, count = values.shape[1:]
     around = np.arange(-2, angles + 2) % angles
     bends = np.abs(np.diff(values[:, around], 4, axis=1)).max(axis=0)
-    good: NDArray[np.bool_] = AROUND_ERROR * bends < ERROR_SHARE * error  # NaN: False
+    good: NDArray[np.bool_] = CUBIC_ERROR * bends < ERROR_SHARE * error  # NaN: False
     rises = np.abs(np.diff(values, 6, axis=2)).max(axis=0)
     smooth = ALONG_ERROR * rises < ERROR_SHARE * error
     good &= smooth[:, np.clip(np.arange(count) - 3, 0, smooth.shape[1] - 1)]
     # An error of the edge's place is one of delta, by which the sky turns about twice as fast as by ln(delta) at most.
-    displaced = AROUND_ERROR * np.abs(np.diff(edge[around], 4))
+    displaced = CUBIC_ERROR * np.abs(np.diff(edge[around], 4))
     good &= 2.0 * displaced[:, None] < ERROR_SHARE * error * delta
     return good
-
-
-def position_angles(light: Array) -> tuple[Array, Array]:
-    """Return how far from the hole's direction a FIDO sees light, and its position angle there in [0, 2 pi], radians;
-    for `light` see `SkyTable.directions`."""
-    outward, aside, up = light
-    away: Array = np.arctan2(np.sqrt(aside * aside + up * up), outward)
-    angle = np.arctan2(-up, -aside)
-    angle += (angle < 0.0) * (2.0 * math.pi)
-    return away, angle
-
-
-def angle_steps(angle: Array, count: int) -> tuple[NDArray[np.intp], Array]:
-    """Return angles in steps of a circle divided by `count`: whole ones and the part left."""
-    steps = angle * (count / (2.0 * math.pi))
-    whole = np.minimum(steps.astype(np.intp), count - 1)
-    return whole, steps - whole
-
-
-def lagrange_weights(part: Array, points: tuple[int, ...]) -> list[Array]:
-    """Return the weights of Lagrange's interpolation among points at whole numbers, for places between 0 and 1."""
-    away = {point: part - point for point in points}
-    weights = []
-    for point in points:
-        others = [other for other in points if other != point]
-        weight = away[others[0]] * (1.0 / math.prod(point - other for other in others))
-        for other in others[1:]:
-            weight *= away[other]
-        weights.append(weight)
-    return weights
-
-
-def nearest_turn(angle: Array) -> Array:
-    """Return angles brought to [-pi, pi] by whole turns."""
-    turn = 2.0 * math.pi
-    near: Array = angle - turn * np.round(angle * (1.0 / turn))
-    return near

@@ -7,18 +7,14 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..disk_passes.disk_painting import DiskPainting
 from ..disk_passes.disk_pass import DiskPass
-from ..geodesics.tracer import Cancel, Progress, drain
+from ..numerics.arrays import Image
+from ..numerics.work import Cancel, Progress, drain
 from ..sampling.view import View
 from ..shot.map_parameters import WarpMapParameters
 from .painting import Painting
 from .sky_table import SkyTable
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE, Fate, trace_block
+from ..geodesics.tracer import Fate, trace_block
 from ..kerr.critical_curve import around_hole, edge_angles
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, rays_from_triad, redshift_vector
+from ..kerr.rays import rays_from_triad, redshift_vector
+from ..numerics.arrays import Array, Image
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.sphere import cos_sin, spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import IDENTITY, WarpMapParameters
@@ -44,8 +46,6 @@ STAMP = 1.0
 # Shorter vectors than this are not directions: rays that could not be resolved, whose vectors are 0. Between places
 # whose light comes from opposite directions, beside the flat side of a fast hole, interpolation shortens vectors too.
 SHORTEST = 1e-3
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

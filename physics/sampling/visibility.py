@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 
 # Cells along each side of a pixel at the edge. A chord across a cell cuts off 1/(8 n^2 R) of the pixel for an edge of
 # radius R pixels: 8e-4 for a shadow 20 pixels wide.

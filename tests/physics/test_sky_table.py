@@ -10,9 +10,10 @@ from references import about, angle_between, unit_vectors
 from shots import shot
 
 from physics import Fate, MapBaker, Observer, PanoramaCamera, PerspectiveCamera, bake
-from physics.geodesics.tracer import drain, trace_block
+from physics.geodesics.tracer import trace_block
 from physics.kerr.rays import light_in_fido_frame, rays_from_triad
 from physics.maps.sky_table import sky_table_steps
+from physics.numerics.work import drain
 
 # Spin, radius and inclination of a camera, the motion it is given, and the share of the sky that must be served: less
 # for fast holes, next to whose prograde edge the sky turns too fast for any regular grid.
