@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
-from ..geodesics.quadrature import gauss_legendre
 from ..kerr.critical_curve import position_angles
 from ..numerics.angles import wrap_symmetric
 from ..numerics.arrays import Array, Index, Mask
@@ -27,7 +27,7 @@ from .annulus import LEAST_COVERAGE, share_above
 from .ring_table import RingTable
 
 # Gauss's places and weights across the part of the band in a pixel, in units of its width.
-_PLACES, _WEIGHTS = gauss_legendre(3)
+_PLACES, _WEIGHTS = leggauss(3)
 PLACES, WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
 
 # Steps along a tile's side to the places that tell whether the band touches it; more in a panorama, where a tile may

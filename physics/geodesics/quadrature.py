@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
@@ -53,12 +54,8 @@ ROOT_ROUNDS = 3
 MOST_PLAIN_NODES = 14
 
 
-gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
-"""From a number of nodes to the nodes in [-1, 1] and their weights."""
-
-
 def _rule(count: int) -> tuple[list[float], list[float]]:
-    nodes, weights = gauss_legendre(count)
+    nodes, weights = leggauss(count)
     return nodes.tolist(), weights.tolist()
 
 

@@ -15,13 +15,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.rays import Rays
 from ..numerics.arrays import Array, Index, Mask
 from ..numerics.weierstrass import QuarticMotion, Weierstrass, acceleration
 from .mino import radial_polynomial
-from .quadrature import gauss_legendre, negative_root
+from .quadrature import negative_root
 from .radial_path import TAIL, Places, along_parabola, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
 
@@ -83,7 +84,7 @@ class _Rule:
     @classmethod
     def of(cls, count: int) -> _Rule:
         """Return the rule of an even number of nodes."""
-        nodes, weights = gauss_legendre(count)
+        nodes, weights = leggauss(count)
         polynomials = [np.ones(count), nodes]
         for n in range(1, count - 1):
             polynomials.append(((2 * n + 1) * nodes * polynomials[n] - n * polynomials[n - 1]) / (n + 1))

@@ -17,7 +17,6 @@ from ..sampling.view import View
 from ..sampling.visibility import CENTER_REACH, cells_for_shadow, center_block, near_edge, refine
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters
-from .sky_table import SkyTable
 
 # What pixels without any sky carry for 1 + z: no redshift. 0 is kept for "no valid map".
 SHADOW_ONE_PLUS_Z = 1.0
@@ -36,12 +35,11 @@ MOST_PIECES = 100_000
 
 
 class Painting:
-    """A warp map in the making; with a table of the same place it traces only what that leaves open."""
+    """A warp map in the making."""
 
-    def __init__(self, parameters: WarpMapParameters, table: SkyTable | None = None, view: View | None = None) -> None:
+    def __init__(self, parameters: WarpMapParameters, view: View | None = None) -> None:
         """`view`: of these parameters, if there is one already."""
         self._parameters = parameters
-        self._table = table
         self._view = View(parameters) if view is None else view
         self._width, self._height = parameters.map_size
         shape = (self._height, self._width)
@@ -49,7 +47,6 @@ class Painting:
         self._one_plus_z = np.full(shape, SHADOW_ONE_PLUS_Z, np.float32)
         self._unresolved = 0
         self._rays = 0
-        self._shared = 0
 
     @property
     def planes(self) -> tuple[Image, Image, Image, Image]:
@@ -57,7 +54,7 @@ class Painting:
         return self._theta, self._phi, self._one_plus_z, self._visibility
 
     def counts(self) -> dict[str, int]:
-        """Number of pixels by what they see, of the rays traced for them, and of those that a table stood for."""
+        """Number of pixels by what they see, and of the rays traced for them."""
         whole = int(np.count_nonzero(self._visibility == 1.0))
         dark = int(np.count_nonzero(self._visibility == 0.0))
         return {
@@ -66,7 +63,7 @@ class Painting:
             "shadow": dark,
             "unresolved": self._unresolved,
             "rays": self._rays,
-            "shared": self._shared,
+            "shared": 0,
         }
 
     def steps(self) -> Generator[float, None, None]:
@@ -163,18 +160,7 @@ class Painting:
         return direction.T
 
     def _block_directions(self, x: Array, y: Array) -> Array:
-        """Do what `_directions` does for one block."""
-        if self._table is None:
-            return self._trace_rays(x, y)
-        direction = self._table.directions(self._view.light(x, y), self._view.phi)
-        left = np.flatnonzero(np.isnan(direction[:, 0]))
-        self._shared += len(x) - len(left)
-        if len(left):
-            direction[left] = self._trace_rays(x[left], y[left])
-        return direction
-
-    def _trace_rays(self, x: Array, y: Array) -> Array:
-        """Return what `_directions` does, a ray for each."""
+        """Return the same as `_directions`, for one block."""
         _, direction = trace_block(self._view.rays(x, y), self._parameters.tolerance, self._parameters.method)
         self._rays += len(x)
         return direction
