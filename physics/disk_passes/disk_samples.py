@@ -37,7 +37,8 @@ PIXEL_ERROR = 0.03
 # Tables are worthwhile for a shadow of at least this many pixels' radius. From afar that is about this in units of M.
 LEAST_SHADOW = 8.0
 SHADOW = math.sqrt(27.0)
-# The largest impact parameter of a trapped orbit, and what tables reach to, as multiples of the shadow's radius.
+# The largest impact parameter of a spherical photon orbit, and what tables reach to, as multiples of the shadow's
+# radius.
 LARGEST_SHADOW, AROUND_SHADOW = 7.0, 1.0 + REACH[1]
 # Places along each side of the picture that are looked at for the shadow.
 LOOKS = 16
@@ -199,8 +200,8 @@ class DiskSamples:
             # Moved to a rim, channels no longer fit together: no light of this energy and momentum has more (Eq. 3 with
             # q = 0).
             energy, b = values[ENERGY], values[MOMENTUM]
-            drag, p = b - spin * energy, energy * (radius * radius + spin * spin) - spin * b
-            most = np.sqrt(np.maximum(p * p - (radius * (radius - 2.0) + spin * spin) * drag * drag, 0.0))
+            b_minus_ae, p = b - spin * energy, energy * (radius * radius + spin * spin) - spin * b
+            most = np.sqrt(np.maximum(p * p - (radius * (radius - 2.0) + spin * spin) * b_minus_ae * b_minus_ae, 0.0))
             radial = np.clip(values[SLOPE] / (u * u), -most, most)
             g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
         else:

@@ -75,7 +75,7 @@ class PolarMotion:
         """Return the constants for `rays`."""
         triad = spherical_triad(rays.observer.theta, rays.observer.phi)
         a2, w0 = rays.spin * rays.spin, triad[0, 2] * triad[0, 2]
-        reduced = rays.carter - a2
+        reduced = rays.q_plus_b2 - a2
         root = np.sqrt(np.maximum(reduced * reduced + 4.0 * a2 * rays.q, 0.0))
         with np.errstate(invalid="ignore", divide="ignore"):
             base = np.where(reduced < 0.0, 2.0 * a2 * rays.q / (root - reduced), 0.5 * (reduced + root))

@@ -205,7 +205,7 @@ def _apply(
     nodes_and_weights = RULES[count]
     rates, unit, spin, argument = integrand.rates[:, rays], integrand.unit[rays], integrand.spin, integrand.argument
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
-    a2, drag_b = spin * spin, spin * integrand.b[rays]
+    a2, a_b = spin * spin, spin * integrand.b[rays]
     time, psi = np.zeros_like(unit), np.zeros_like(unit)
     # Node by node for the rules that most rays need; all nodes at once for the others, whose rays are few.
     passes: Iterable[tuple[float | Array, float | Array]] = zip(*nodes_and_weights, strict=True)
@@ -239,7 +239,7 @@ def _apply(
         below -= 2.0
         below *= z
         below += 1.0
-        above = drag_b * z
+        above = a_b * z
         above -= 2.0
         above *= z
         speed *= below

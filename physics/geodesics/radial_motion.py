@@ -114,7 +114,7 @@ class _Paths:
         self._constants = constants
         self.quartic: Array = constants[:3]
         """c_2, c_3, c_4 of U, shape (3, n)."""
-        self.slope, self.b, self.drag, inward, self.lowest, self.pace = constants[3:]
+        self.slope, self.b, self.carter_k, inward, self.lowest, self.pace = constants[3:]
         """du / dlambda at the camera; p_phi; q + (b - a)^2; U's negative root, to some per cent, where rays stay that
         have gone beyond infinity; how fast the ray's direction turns, radians per Mino time."""
         self.inward: Mask = inward > 0.0
@@ -133,10 +133,10 @@ class _Paths:
                     *quartic,
                     rays.radial * (start * start),
                     rays.b,
-                    rays.carter + spin * (spin - 2.0 * rays.b),
+                    rays.q_plus_b2 + spin * (spin - 2.0 * rays.b),
                     ~barrier.blocks & (rays.radial >= 0.0),
                     -negative_root(rays),
-                    np.sqrt(np.maximum(rays.carter + spin * spin, 0.0)),
+                    np.sqrt(np.maximum(rays.q_plus_b2 + spin * spin, 0.0)),
                 ]
             )
             return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
@@ -175,7 +175,7 @@ class _Paths:
         p = square * (a * (a - self.b))
         p += 1.0
         p += np.abs(slope)
-        square *= self.drag
+        square *= self.carter_k
         # 1 - 2 u + a^2 u^2
         delta = u * (a * a)
         delta -= 2.0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much of each pixel sees the sky: the shadow's edge, anti-aliased from its closed form.
 
-`trapped.edge_function` is a smooth signed function of the ray that vanishes on the edge. Pixels whose corners all
-have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's center (a distant hole
+`critical_curve.edge_function` is a smooth signed function of the ray that vanishes on the edge. Pixels whose corners
+all have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's center (a distant hole
 is smaller than a pixel), are divided into cells, and the edge is followed from cell to cell as a chain of chords.
 """
 
