@@ -17,14 +17,13 @@ import numpy as np
 from measuring import Row
 
 import physics
-from physics.geodesics.tracer import drain
+from physics.numerics.work import drain
 
 SIZE = (1920, 1080)
 
 Frames = list[physics.WarpMapParameters]
 
-# Spin and radius of the camera's place: the scene of the other numbers, and an ordinary one. Next to the prograde edge
-# of a hole as fast as the first the sky turns too fast for a table.
+# Spin and radius of the camera's place: the scene of the other numbers, and an ordinary one.
 PLACES = ((measuring.SPIN, measuring.RADIUS), (0.9, 22.0))
 
 
@@ -47,7 +46,7 @@ def row(name: str, shots: Frames, seconds: float) -> Row:
 
 
 def moves(frames: int, spin: float, radius: float) -> dict[str, Frames]:
-    """Camera moves whose frames have the same sky, and one whose frames do not."""
+    """Camera moves: the frames of the first share their rays, those of the others do not."""
     share = np.linspace(0.0, 1.0, frames)
     shot = functools.partial(measuring.shot, *SIZE, spin=spin, radius=radius)
     return {

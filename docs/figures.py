@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from physics import Observer, trace_rays
 from physics.geodesics.mino import radial_polynomial
-from physics.kerr.critical_curve import trapped_carter_constant, trapped_impact_parameters
+from physics.kerr.critical_curve import critical_carter_constant, critical_impact_parameters
 from physics.kerr.metric import ergosphere_radius, horizon_radius, isco_radius, metric_functions, photon_orbit_radius
 from physics.kerr.rays import camera_directions, rays_from_camera
 from physics.light.disk_flux import relative_flux
@@ -52,10 +52,10 @@ def critical_curves() -> Figure:
     """The shadow's edge for several spins, seen from far away in the plane of the rotation (Eqs. 9, 10)."""
     figure, axes = plt.subplots(figsize=(5.2, 5.2))
     for spin in SPINS:
-        low, high = trapped_impact_parameters(spin)
+        low, high = critical_impact_parameters(spin)
         b = np.clip(0.5 * (low + high) + 0.5 * (high - low) * np.cos(np.linspace(0.0, math.pi, 400)), low, high)
         # Seen from the plane, -b across and sqrt(q) up are the place on the sky in units of M / distance.
-        up = np.sqrt(np.maximum(trapped_carter_constant(spin, b), 0.0))
+        up = np.sqrt(np.maximum(critical_carter_constant(spin, b), 0.0))
         (line,) = axes.plot(-b, up, label=f"spin {spin:g}")
         axes.plot(-b, -up, color=line.get_color())
     axes.set(aspect="equal", xlabel="across, −b (M)", ylabel="up, ±√q (M)")
@@ -96,7 +96,7 @@ def radial_motion() -> Figure:
     figure, panels = plt.subplots(1, 2, sharey=True, figsize=(8.0, 3.8))
     u = np.linspace(0.0, 0.75, 400)
     for axes, spin in zip(panels, (0.0, 0.9), strict=True):
-        critical = trapped_impact_parameters(spin)[1]
+        critical = critical_impact_parameters(spin)[1]
         b = np.array([0.8, 1.0, 1.25]) * critical
         observer = Observer.fido(FAR, 0.5 * math.pi, 0.0)
         looking = camera_directions(np.full(3, 0.5 * math.pi), _looking(spin, b, FAR))
@@ -116,7 +116,7 @@ def paths() -> Figure:
     figure, panels = plt.subplots(1, 2, sharex=True, sharey=True, figsize=(8.0, 4.2))
     b = np.linspace(-9.0, 9.0, 37)
     for axes, spin in zip(panels, (0.0, 0.9), strict=True):
-        low, high = trapped_impact_parameters(spin)
+        low, high = critical_impact_parameters(spin)
         horizon = horizon_radius(spin)
         for each, (x, y) in zip(b, _integrated(spin, b), strict=True):
             axes.plot(x, y, linewidth=0.8, color="tab:red" if low < each < high else "tab:blue")
@@ -134,8 +134,8 @@ def _integrated(spin: float, b: np.ndarray, steps: int = 4000) -> list[tuple[np.
 
     def slope(state: np.ndarray) -> np.ndarray:
         u, rate, _ = state
-        drag = spin * (2.0 * u - spin * b * u * u) / (1.0 - 2.0 * u + spin * spin * u * u)
-        return np.stack([rate, u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u)), b + drag])
+        psi_rate = spin * (2.0 * u - spin * b * u * u) / (1.0 - 2.0 * u + spin * spin * u * u)
+        return np.stack([rate, u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u)), b + psi_rate])
 
     track, step = [state], 2.0 / steps
     limit = 0.97 / horizon_radius(spin)
@@ -184,12 +184,12 @@ def deflection() -> Figure:
     figure, axes = plt.subplots()
     away = np.geomspace(1e-4, 12.0, 120)
     for spin in (0.0, 0.5, 0.9):
-        low, high = trapped_impact_parameters(spin)
+        low, high = critical_impact_parameters(spin)
         for end, style in ((high, "-"), (low, "--")) if spin else ((high, "-"),):
             b = np.sign(end) * (abs(end) + away)
             label = f"spin {spin:g}" + (", against it" if end < 0.0 else ", with it" if spin else ", traced")
             axes.plot(np.abs(b), np.degrees(traced_deflection(spin, b)), style, label=label)
-    b = trapped_impact_parameters(0.0)[1] + away[::6]
+    b = critical_impact_parameters(0.0)[1] + away[::6]
     axes.plot(b, np.degrees(schwarzschild_deflection(b)), "k.", label="spin 0, Darwin's closed form")
     axes.plot(b, np.degrees(4.0 / b), color="gray", linestyle=":", label="4 M / b, far from the hole")
     axes.set(xlabel="impact parameter |b| (M)", ylabel="bent by (degrees)", xlim=(2.0, 12.0), ylim=(0.0, 400.0))

@@ -23,12 +23,14 @@ from ..files.map_file import ATTRIBUTE_FORMAT
 from ..files.warp_map_file import read_warp_map
 from ..geodesics.exit_lines import exit_lines
 from ..geodesics.radial_path import winding
-from ..geodesics.tracer import BLOCK_SIZE, Cancel, Fate, Progress, drain, trace_block
+from ..geodesics.tracer import Fate, trace_block
 from ..images.exr import PathLike, read_exr_header
-from ..kerr.rays import Array
 from ..maps.painting import UNRESOLVED_ONE_PLUS_Z
+from ..numerics.arrays import Array
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..numerics.sphere import unit_vectors
+from ..numerics.work import Cancel, Progress, drain
 from ..sampling.view import View
 from ..sampling.visibility import cells_for_shadow, center_block, refine
 from ..shot.map_parameters import WarpMapParameters

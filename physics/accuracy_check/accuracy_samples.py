@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array, Image, Mask
 
-Mask = NDArray[np.bool_]
 Pixels = NDArray[np.intp]
-Image = NDArray[np.float32]
 
 # Of all samples, so many are spread evenly; the others lie at the shadow's edge, where neighbors differ most, and
 # where pixels do not fit their neighbors, in equal parts.

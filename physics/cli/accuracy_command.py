@@ -10,8 +10,8 @@ from typing import Any
 
 from ..accuracy_check.accuracy import DEFAULT_ENVIRONMENT_WIDTH, DEFAULT_SAMPLES, check_accuracy
 from ..files.warp_map_file import read_warp_map_metadata
-from ..geodesics.tracer import Progress
 from ..numerics.errors import WarpMapError
+from ..numerics.work import Progress
 from .disk_command import pass_path
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from ..disk_passes.disk_pass import DiskPass
 from ..files.disk_pass_file import read_disk_pass, write_disk_pass
 from ..geodesics.disk_tracer import DEFAULT_CROSSINGS
-from ..kerr.rays import Array
 from ..light.disk_look import PRESETS
 from ..light.disk_texture import disk_texture
 from ..maps.warp_map import WarpMap
+from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..reference.disk_render import disk_layers, over_sky
 from ..shot.disk import DEFAULT_OUTER_RADIUS, Disk

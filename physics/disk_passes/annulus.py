@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 from ..sampling.tiles import TILE_SIDES, chebyshev_places
 
 # A slope along one axis of less than this share of the other's counts as that.

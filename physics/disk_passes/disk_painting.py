@@ -19,14 +19,14 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE
-from ..kerr.rays import Array
-from ..maps.painting import pool
+from ..numerics.arrays import Array, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..sampling.tiles import (
     TAIL_SHARE,
     TILE_SIDES,
     Tiles,
     coefficients_of,
+    pool,
     sample_places,
     sides_for,
     tails_of,
@@ -40,8 +40,6 @@ from .disk_pixels import DiskTracing
 from .disk_planes import BentU, Channels, DiskPlanes, mean_matter
 from .disk_samples import MOMENTUM, PHI, PIXEL_ERROR, PLACE_ERROR, SLOPE, DiskSamples, Matter, U
 from .ring_painting import WEIGHTS, RingPainting, RingPixels, TileSurvey
-
-Mask = NDArray[np.bool_]
 
 # Chebyshev points along each side of a tile: the sky, which has to be better known, has more.
 DISK_POINTS = 8

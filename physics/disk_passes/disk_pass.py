@@ -6,10 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Image = NDArray[np.float32]
+from ..numerics.arrays import Image
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,12 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE
-from ..kerr.rays import Array
+from ..numerics.arrays import Array, Index, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..sampling.tiles import TILE_SIDES, Tiles, tiles_of
 from .annulus import coverage, nearest_covered
 from .disk_planes import DiskPlanes, mean_matter, slopes
 from .disk_samples import DiskSamples, U
-
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 
 # So far off the disk, in units of 1 / r at its outer and inner rim, it does not matter for differences between pixels;
 # and in 1 / M for large disks, whose outer rim is next to infinity.

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array, indices
-from ..maps.painting import in_circle, wrapped
-from ..maps.sky_table import nearest_turn
+from ..numerics.angles import wrap, wrap_once, wrap_symmetric
+from ..numerics.arrays import Array, Index, indices
 from ..sampling.tiles import TILE_SIDES, Tiles, at_pixels
 from .annulus import coverage, nearest_covered
 from .disk_samples import PHI, Matter, U
 
-Index = NDArray[np.intp]
 Channels = NDArray[Any]
 """Shape (channels, ...), in single precision for whole tiles."""
 MatterOf = Callable[[Channels], Matter]
@@ -63,7 +61,7 @@ class BentU:
 
     def matter(self, values: Channels) -> Matter:
         """Return the matter at places given by bent u, azimuth and g."""
-        return self.radius(values[U]), in_circle(values[PHI]), values[G]
+        return self.radius(values[U]), wrap(values[PHI]), values[G]
 
 
 class DiskPlanes:
@@ -188,7 +186,7 @@ def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
     step, at = np.array([[1], [columns]]), np.stack([place % columns, place // columns % rows])
     before, after = at > 0, at < np.array([[columns - 1], [rows - 1]])  # one only at the tile's own edge
     change = flat.take(place + step * after, axis=1) - flat.take(place - step * before, axis=1)
-    change[PHI] = nearest_turn(change[PHI])
+    change[PHI] = wrap_symmetric(change[PHI])
     change = change / (1.0 + (before & after))
     change[np.isnan(change)] = 0.0
     return change[:, 0], change[:, 1]
@@ -222,4 +220,4 @@ def mean_matter(radius: Array, phi: Array, g: Array, weights: Array) -> Matter:
     weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
     mean = [(each * weights).sum(axis=0) for each in (1.0 / radius, np.cos(phi), np.sin(phi), g)]
     with np.errstate(divide="ignore"):
-        return 1.0 / mean[0], wrapped(np.arctan2(mean[2], mean[1])), mean[3]
+        return 1.0 / mean[0], wrap_once(np.arctan2(mean[2], mean[1])), mean[3]

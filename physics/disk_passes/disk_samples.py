@@ -11,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geodesics.radial_path import winding
-from ..geodesics.tracer import BLOCK_SIZE, DEFAULT_METHOD, Fate
+from ..geodesics.tracer import DEFAULT_METHOD, Fate
+from ..kerr.critical_curve import position_angles
 from ..kerr.metric import isco_radius
 from ..kerr.orbiting_matter import circular_redshift, redshift_factor
-from ..kerr.rays import Array
-from ..maps.painting import in_circle
-from ..maps.sky_table import position_angles
+from ..numerics.angles import wrap
+from ..numerics.arrays import Array, Index, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..sampling.view import View
 from ..shot.map_parameters import WarpMapParameters
 from .ring_grid import Needs
 from .ring_table import RingTable
 from .ring_tracing import REACH, ring_tables
 
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 Matter = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 """Radius, azimuth in [0, 2 pi) and g."""
 
@@ -38,7 +37,8 @@ PIXEL_ERROR = 0.03
 # Tables are worthwhile for a shadow of at least this many pixels' radius. From afar that is about this in units of M.
 LEAST_SHADOW = 8.0
 SHADOW = math.sqrt(27.0)
-# The largest impact parameter of a trapped orbit, and what tables reach to, as multiples of the shadow's radius.
+# The largest impact parameter of a spherical photon orbit, and what tables reach to, as multiples of the shadow's
+# radius.
 LARGEST_SHADOW, AROUND_SHADOW = 7.0, 1.0 + REACH[1]
 # Places along each side of the picture that are looked at for the shadow.
 LOOKS = 16
@@ -189,7 +189,7 @@ class DiskSamples:
     def matter(self, values: NDArray[Any]) -> Matter:
         """Return radius, azimuth in [0, 2 pi) and g of places on the disk, from channels of shape (channels, ...)."""
         azimuth, g = self.azimuth_and_g(values)
-        return 1.0 / values[U], in_circle(azimuth), g
+        return 1.0 / values[U], wrap(azimuth), g
 
     def azimuth_and_g(self, values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return azimuth, unwrapped, and g of places on the disk, from channels of shape (channels, ...)."""
@@ -200,8 +200,8 @@ class DiskSamples:
             # Moved to a rim, channels no longer fit together: no light of this energy and momentum has more (Eq. 3 with
             # q = 0).
             energy, b = values[ENERGY], values[MOMENTUM]
-            drag, p = b - spin * energy, energy * (radius * radius + spin * spin) - spin * b
-            most = np.sqrt(np.maximum(p * p - (radius * (radius - 2.0) + spin * spin) * drag * drag, 0.0))
+            b_minus_ae, p = b - spin * energy, energy * (radius * radius + spin * spin) - spin * b
+            most = np.sqrt(np.maximum(p * p - (radius * (radius - 2.0) + spin * spin) * b_minus_ae * b_minus_ae, 0.0))
             radial = np.clip(values[SLOPE] / (u * u), -most, most)
             g = redshift_factor(spin, radius, values[MOMENTUM], values[ENERGY], radial, retrograde).astype(u.dtype)
         else:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 
 # The step of asinh(delta / w).
 STEP = 0.25

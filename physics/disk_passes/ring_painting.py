@@ -16,21 +16,18 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial.legendre import leggauss
 
-from ..geodesics.quadrature import gauss_legendre
-from ..kerr.rays import Array
-from ..maps.sky_table import nearest_turn, position_angles
+from ..kerr.critical_curve import position_angles
+from ..numerics.angles import wrap_symmetric
+from ..numerics.arrays import Array, Index, Mask
 from ..sampling.tiles import TILE_SIDES, Tiles, chebyshev_places, tiles_of, to_coefficients
 from ..sampling.view import View
 from .annulus import LEAST_COVERAGE, share_above
 from .ring_table import RingTable
 
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
-
 # Gauss's places and weights across the part of the band in a pixel, in units of its width.
-_PLACES, _WEIGHTS = gauss_legendre(3)
+_PLACES, _WEIGHTS = leggauss(3)
 PLACES, WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
 
 # Steps along a tile's side to the places that tell whether the band touches it; more in a panorama, where a tile may
@@ -194,7 +191,7 @@ class RingPainting:
         """
         wide = tiles.side + 2
         sampled, known = self._sampled(tiles, chebyshev_places(NODES) * (wide - 1) - 0.5)
-        sampled[3] = sampled[3, :, :1, :1] + nearest_turn(sampled[3] - sampled[3, :, :1, :1])
+        sampled[3] = sampled[3, :, :1, :1] + wrap_symmetric(sampled[3] - sampled[3, :, :1, :1])
         highest = to_coefficients(NODES)[-1]
         tail = np.maximum(np.abs(sampled[:4] @ highest), np.abs(sampled[:4].swapaxes(2, 3) @ highest)).max(axis=2)
         tail[3] *= sampled[2].max(axis=(1, 2))

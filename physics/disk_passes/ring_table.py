@@ -23,12 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
-from ..maps.sky_table import AROUND, AROUND_ERROR, angle_steps, lagrange_weights
+from ..numerics.angles import circle_steps
+from ..numerics.arrays import Array, Index, Mask
+from ..numerics.interpolation import CUBIC_ERROR, CUBIC_POINTS, lagrange_weights
 from .ring_grid import Grid, Needs, continuous
 
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 Pairs = NDArray[np.complex128]
 """Two numbers as one, to be looked up together."""
 
@@ -54,7 +53,7 @@ class RingTable:
         azimuth, self._beyond, once_round = continuous(values[1])
         channels, good, placed = _served((values[0], azimuth, values[2]), once_round, coordinates, needs)
         self._columns = int(good.shape[1])
-        around = np.arange(AROUND[0], self._angles + AROUND[-1]) % self._angles
+        around = np.arange(CUBIC_POINTS[0], self._angles + CUBIC_POINTS[-1]) % self._angles
         # The outermost columns served to tell the errors alone.
         grid = (coordinates.edge, coordinates.scale, coordinates.low + coordinates.step, coordinates.step)
         self._grid = _pairs([each[around] for each in grid])
@@ -66,7 +65,7 @@ class RingTable:
         """The share of the table's places on the disk that it answers for."""
         self._open = ~_cells(~on_disk | good)
         self._good = _cells(good).ravel()
-        placed = placed[-AROUND[0] :][: self._angles]
+        placed = placed[-CUBIC_POINTS[0] :][: self._angles]
         rims = [_Rim.of(values[0][:, 1:-1], placed, level, grid, needs) for level in self._rims]
         known = rims[0].known & rims[1].known
         self._band = _pairs([rim.away[around] for rim in reversed(rims)])
@@ -95,13 +94,13 @@ class RingTable:
         u is NaN where there is no answer, and infinite beyond the ends of an image that is `confined`.
         """
         row, across, (edge, scale, low, step) = self._around(angle, self._grid)
-        place: Array = (np.arcsinh((away - edge) / scale) - low) / step + AROUND[0]
+        place: Array = (np.arcsinh((away - edge) / scale) - low) / step + CUBIC_POINTS[0]
         before = place < 0.0
-        inside = ~before & (place < self._columns - len(AROUND) + 1.0)
+        inside = ~before & (place < self._columns - len(CUBIC_POINTS) + 1.0)
         place = np.where(inside, place, 0.0)
         column = place.astype(np.intp)
         part = place - column
-        along = lagrange_weights(part, AROUND)
+        along = lagrange_weights(part, CUBIC_POINTS)
         pairs = self._channels[: (channels + 1) // 2]
         sums: list[Pairs] = [np.zeros(len(away), complex) for _ in pairs]
         for i, weight in enumerate(across):
@@ -113,7 +112,7 @@ class RingTable:
                 partial *= weight
                 total += partial
         result = np.stack(_unpaired(sums)[:channels])
-        unknown = ~self._good.take(row * (self._columns - len(AROUND) + 1) + column)
+        unknown = ~self._good.take(row * (self._columns - len(CUBIC_POINTS) + 1) + column)
         unknown &= (result[0] >= self._rims[0]) & (result[0] <= self._rims[1])
         result[0, unknown] = np.nan
         if self._beyond:
@@ -135,8 +134,8 @@ class RingTable:
 
     def _around(self, angle: Array, rows: list[Pairs]) -> tuple[Index, list[Array], list[Array]]:
         """Return the first rows and the weights that interpolate between them, and interpolated values of rows."""
-        row, part = angle_steps(angle, self._angles)
-        across = lagrange_weights(part, AROUND)
+        row, part = circle_steps(angle, self._angles)
+        across = lagrange_weights(part, CUBIC_POINTS)
         sums: list[Pairs] = [np.zeros(len(angle), complex) for _ in rows]
         for i, weight in enumerate(across):
             index = row + i
@@ -148,8 +147,10 @@ class RingTable:
 def _cells(good: Mask) -> Mask:
     """Return which cells have all of the nodes good that they are interpolated among, along every axis."""
     for axis, size in enumerate(good.shape):
-        last = size - len(AROUND) + 1
-        good = np.logical_and.reduce([good[(slice(None),) * axis + (slice(i, last + i),)] for i in range(len(AROUND))])
+        last = size - len(CUBIC_POINTS) + 1
+        good = np.logical_and.reduce(
+            [good[(slice(None),) * axis + (slice(i, last + i),)] for i in range(len(CUBIC_POINTS))]
+        )
     return good
 
 
@@ -181,20 +182,20 @@ class _Rim:
         away = edge + scale * np.sinh(low + step * column)
         wide = np.arange(-2, len(away) + 2) % len(away)
         with np.errstate(invalid="ignore"):
-            known = AROUND_ERROR * np.abs(np.diff(away[wide], 4)) < needs.pixel_error * needs.pixel  # NaN: False
-        nodes = first[:, None] + np.array(AROUND)
+            known = CUBIC_ERROR * np.abs(np.diff(away[wide], 4)) < needs.pixel_error * needs.pixel  # NaN: False
+        nodes = first[:, None] + np.array(CUBIC_POINTS)
         return cls(away, known & np.take_along_axis(placed, nodes, axis=1).all(axis=1))
 
 
 def _falls_to(u: Array, level: float) -> tuple[Array, Index]:
     """Return in which column u, shape (angles, columns), falls to a level for good, NaN where that is not known; and
-    the last whole one before, at which cubics through `AROUND` are possible."""
+    the last whole one before, at which cubics through `CUBIC_POINTS` are possible."""
     columns = u.shape[1]
     with np.errstate(invalid="ignore"):
         above = u >= level
     last = columns - 1 - np.argmax(above[:, ::-1], axis=1)
-    first = np.clip(last, -AROUND[0], columns - 1 - AROUND[-1])
-    nodes = np.take_along_axis(u, first[:, None] + np.array(AROUND), axis=1)
+    first = np.clip(last, -CUBIC_POINTS[0], columns - 1 - CUBIC_POINTS[-1])
+    nodes = np.take_along_axis(u, first[:, None] + np.array(CUBIC_POINTS), axis=1)
     # Newton's method on the cubic, from the straight line between the middle two
     before, here, after, last_one = nodes.T
     slope = after - before / 3.0 - 0.5 * here - last_one / 6.0
@@ -228,7 +229,7 @@ def _left_out(values: Array, axis: int) -> Array:
     """Return what cubics through neighbors along an axis leave out at the most, from the nearest fourth difference."""
     differences = np.abs(np.diff(values, 4, axis=axis))
     nearest = np.clip(np.arange(values.shape[axis]) - 2, 0, differences.shape[axis] - 1)
-    left_out: Array = AROUND_ERROR * differences.take(nearest, axis=axis)
+    left_out: Array = CUBIC_ERROR * differences.take(nearest, axis=axis)
     return left_out
 
 
@@ -253,7 +254,7 @@ def _served(
     across = needs.pixel * angles / (2.0 * math.pi * np.maximum(np.sin(away), needs.pixel))
     # What the coordinates lose between angles, in columns.
     lost_edge, lost_scale, lost_low, lost_step = (
-        AROUND_ERROR * np.abs(np.diff(each[np.arange(-4, angles + 5) % angles], 4))[:, None]
+        CUBIC_ERROR * np.abs(np.diff(each[np.arange(-4, angles + 5) % angles], 4))[:, None]
         for each in (grid.edge, grid.scale, grid.low, grid.step)
     )
     stray = along / needs.pixel * (lost_edge + lost_scale * np.abs(np.sinh(grid.stretched[wide])))

@@ -11,16 +11,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geodesics.crossings import cross_plane
 from ..kerr.critical_curve import all_around, around_hole, edge_angles
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, rays_from_triad
+from ..kerr.rays import rays_from_triad
+from ..numerics.arrays import Array, Index
 from .ring_grid import SCALE_ANGLES, SHARES, Draft, Needs, between
 from .ring_table import RingTable
-
-Index = NDArray[np.intp]
 
 # How far from the edge the tables reach, inside and outside, as shares of its distance from the hole's direction.
 REACH = (0.7, 1.5)

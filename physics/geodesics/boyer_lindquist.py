@@ -14,13 +14,11 @@ import math
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
-
-Mask = NDArray[np.bool_]
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 
 R, THETA, PHI, P_R, P_THETA = range(5)
 
@@ -60,8 +58,8 @@ class PrintedSystem:
         self.state = state
         self._spin = a
         self._b = rays.b
-        self._carter = rays.carter
-        self._scale = np.sqrt(np.abs(rays.carter) + a * a) + 1.0
+        self._q_plus_b2 = rays.q_plus_b2
+        self._scale = np.sqrt(np.abs(rays.q_plus_b2) + a * a) + 1.0
         self._far = max(FAR_RADIUS, FAR_FACTOR * observer.r)
         self._horizon = horizon_radius(a)
         self._drift_limit = DRIFT_LIMIT * tolerance
@@ -145,15 +143,15 @@ class PrintedSystem:
             # Null condition and Eq. 8: both vanish identically on the true ray.
             big_p = r * r + a * a - a * self._b
             null = (delta * p_r) ** 2 + delta * (p_theta * p_theta + w * w) - big_p * big_p
-            carter = p_theta * p_theta + (self._b / sin) ** 2 - a * a * cos * cos - self._carter
-            drift = np.abs(null) / (big_p * big_p) + np.abs(carter) / (self._scale * self._scale)
+            violation = p_theta * p_theta + (self._b / sin) ** 2 - a * a * cos * cos - self._q_plus_b2
+            drift = np.abs(null) / (big_p * big_p) + np.abs(violation) / (self._scale * self._scale)
         failed: Mask = near_axis | inside | self._critical | ~(drift <= self._drift_limit)
         return failed
 
     def select(self, rays: Mask) -> Self:
         """Return the system of these rays alone."""
         chosen = copy.copy(self)
-        chosen._b, chosen._carter, chosen._scale = self._b[rays], self._carter[rays], self._scale[rays]
+        chosen._b, chosen._q_plus_b2, chosen._scale = self._b[rays], self._q_plus_b2[rays], self._scale[rays]
         chosen._critical = self._critical[rays]
         return chosen
 

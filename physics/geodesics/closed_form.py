@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
-from ..kerr.rays import Array, Rays, indices
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, indices
 from .polar import PolarMotion
 from .quadrature import direct_integrals, turning_integrals
 

@@ -17,7 +17,8 @@ from ..kerr.critical_curve import comes_from_sky, find_barrier
 from ..kerr.metric import horizon_radius
 from ..kerr.observer import Observer
 from ..kerr.orbiting_matter import redshift_factor
-from ..kerr.rays import Array, Rays, negative_energy_rays, rays_from_camera
+from ..kerr.rays import Rays, negative_energy_rays, rays_from_camera
+from ..numerics.arrays import Array
 from .polar import PolarMotion
 from .radial_motion import places_of_rays
 from .radial_path import HORIZON_MARGIN

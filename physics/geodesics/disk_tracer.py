@@ -10,24 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, Rays, camera_directions, rays_from_camera
+from ..kerr.rays import Rays, camera_directions, rays_from_camera
+from ..numerics.arrays import Array
+from ..numerics.blocks import blocks
 from ..numerics.checks import whole
 from ..numerics.errors import BlackHoleError
+from ..numerics.work import Cancel, Progress, drain
 from .crossings import Crossings, LightAtDisk, cross_plane, split_by_energy
 from .plane_stepping import step_to_plane
 from .radial_path import winding
-from .tracer import (
-    DEFAULT_MAX_STEPS,
-    DEFAULT_METHOD,
-    DEFAULT_TOLERANCE,
-    Cancel,
-    Fate,
-    Progress,
-    blocks,
-    check_settings,
-    drain,
-    viewing_angles,
-)
+from .tracer import DEFAULT_MAX_STEPS, DEFAULT_METHOD, DEFAULT_TOLERANCE, Fate, check_settings, viewing_angles
 
 DEFAULT_CROSSINGS = 3
 MOST_CROSSINGS = 8

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier, comes_from_sky, find_barrier
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..numerics.runge_kutta import CASH_KARP, integrate
 from .closed_form import radial_integrals

@@ -28,13 +28,11 @@ from abc import ABC, abstractmethod
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 from ..numerics.sphere import spherical_triad
-
-Mask = NDArray[np.bool_]
 
 # Rows of the state: the radial coordinate x, the unit vector n, its derivative n', the extra rotation psi.
 X, N, N_PRIME, PSI = 0, slice(1, 4), slice(4, 7), 7
@@ -62,8 +60,8 @@ BRACKETED_ROUNDS = 60
 def radial_polynomial(rays: Rays) -> tuple[Array, Array, Array]:
     """Return the coefficients c_2, c_3, c_4 of U(u) = 1 + c_2 u^2 + c_3 u^3 + c_4 u^4, each of shape (n,)."""
     a = rays.spin
-    c2 = a * a - rays.carter
-    c3 = 2.0 * (rays.carter + a * a - 2.0 * a * rays.b)
+    c2 = a * a - rays.q_plus_b2
+    c3 = 2.0 * (rays.q_plus_b2 + a * a - 2.0 * a * rays.b)
     c4 = -a * a * rays.q
     return c2, c3, c4
 
@@ -85,10 +83,10 @@ class MinoSystem(ABC):
         self._constants = np.vstack(
             [
                 unit,
-                rays.carter,
+                rays.q_plus_b2,
                 np.full(len(rays), -2.0 * rays.spin),
                 rays.spin**2 * rays.b,
-                1.0 / (np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0)) + 1.0),
+                1.0 / (np.sqrt(np.maximum(rays.q_plus_b2 + rays.spin**2, 0.0)) + 1.0),
                 rates,
             ]
         )
@@ -118,16 +116,16 @@ class MinoSystem(ABC):
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d lambda along the backward ray to `out`; both (8, n)."""
-        unit, carter, drag, drag_b = self._constants[:4]
+        unit, q_plus_b2, psi_u, psi_u2 = self._constants[:4]
         a2 = self._spin * self._spin
         argument = self.argument(state[X])
         out[X] = self._rate(argument)
         n_z = state[3]
         out[N] = state[N_PRIME]
-        # n'' = -(carter + 2 a^2 n_z^2) n + a^2 n_z z
+        # n'' = -(q_plus_b2 + 2 a^2 n_z^2) n + a^2 n_z z
         bend = n_z * n_z
         bend *= -2.0 * a2
-        bend -= carter
+        bend -= q_plus_b2
         np.multiply(state[N], bend, out=out[N_PRIME])
         out[6] += a2 * n_z
         u = unit * (1.0 - argument)
@@ -135,8 +133,8 @@ class MinoSystem(ABC):
         below -= 2.0
         below *= u
         below += 1.0
-        turn = drag_b * u
-        turn += drag
+        turn = psi_u2 * u
+        turn += psi_u
         turn *= u
         np.divide(turn, below, out=out[PSI])
 

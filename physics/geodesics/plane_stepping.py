@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..kerr.critical_curve import comes_from_sky
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Mask
 from ..numerics.runge_kutta import CASH_KARP, attempt, integrate
 from ..numerics.sphere import spherical_triad
 from .crossings import Crossings
@@ -25,8 +26,6 @@ from .mino import FIRST_ANGLE, radial_polynomial
 from .polar import IN_PLANE
 from .radial_path import HORIZON_MARGIN, winding
 from .tracer import Fate
-
-Mask = NDArray[np.bool_]
 
 # Rows of the state: 1 / r, its derivative, the unit vector n, its derivative, the extra rotation psi, the Mino time.
 U, U_PRIME, N, N_PRIME, PSI, TIME = 0, 1, slice(2, 5), slice(5, 8), 8, 9
@@ -52,25 +51,25 @@ class PlaneWatcher:
         state[N_PRIME] = -(theta_hat * rays.polar + phi_hat * rays.azimuthal)
         # cos(pi / 2) in floating point is not 0; a ray in the plane stays there
         state[N_Z, np.abs(state[N_Z]) < IN_PLANE] = 0.0
-        pace = np.sqrt(np.maximum(rays.carter + rays.spin**2, 0.0))
+        pace = np.sqrt(np.maximum(rays.q_plus_b2 + rays.spin**2, 0.0))
         state[N_Z_PRIME, np.abs(state[N_Z_PRIME]) < IN_PLANE * pace] = 0.0
         self.state = state
         self.places = np.full((count, N_COMPONENTS, len(rays)), np.nan)
         self.found = np.zeros(len(rays), dtype=np.intp)
         self._spin = rays.spin
         self._last_u = 1.0 / (horizon_radius(rays.spin) * HORIZON_MARGIN)
-        self._constants = np.vstack([*radial_polynomial(rays), rays.carter, rays.b, 1.0 / (pace + 1.0)])
+        self._constants = np.vstack([*radial_polynomial(rays), rays.q_plus_b2, rays.b, 1.0 / (pace + 1.0)])
         self._ray = np.arange(len(rays))
         self._before = state.copy()
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d lambda along the backward ray to `out`."""
-        c2, c3, c4, carter, b, _ = self._constants
+        c2, c3, c4, q_plus_b2, b, _ = self._constants
         a, u, n_z = self._spin, state[U], state[N_Z]
         out[U] = state[U_PRIME]
         out[U_PRIME] = u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u))
         out[N] = state[N_PRIME]
-        out[N_PRIME] = -(carter + 2.0 * a * a * n_z * n_z) * state[N]
+        out[N_PRIME] = -(q_plus_b2 + 2.0 * a * a * n_z * n_z) * state[N]
         out[N_Z_PRIME] += a * a * n_z
         outer = horizon_radius(a)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

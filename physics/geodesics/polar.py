@@ -26,11 +26,12 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array, Indices, Rays, indices
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Indices, indices
 from ..numerics.sphere import cos_sin, spherical_triad
-from .quadrature import gauss_legendre
 
 # Rays are sorted by e into classes up to these, each with as many terms as its upper end needs, so that what becomes of
 # a ray does not depend on its company. Beyond the last the series is no longer a short one.
@@ -44,7 +45,7 @@ IN_PLANE = 1e-15
 
 # For the few rays without a short series: nodes of a quadrature that leave 1e-13 and 1e-7, with singularities 1e-8 from
 # the path, and the tightest tolerance that the fewer are used for.
-_PLANE_RULE, _SMALL_PLANE_RULE = gauss_legendre(32), gauss_legendre(16)
+_PLANE_RULE, _SMALL_PLANE_RULE = leggauss(32), leggauss(16)
 SMALL_RULE_TOLERANCE = 1e-6
 
 
@@ -74,7 +75,7 @@ class PolarMotion:
         """Return the constants for `rays`."""
         triad = spherical_triad(rays.observer.theta, rays.observer.phi)
         a2, w0 = rays.spin * rays.spin, triad[0, 2] * triad[0, 2]
-        reduced = rays.carter - a2
+        reduced = rays.q_plus_b2 - a2
         root = np.sqrt(np.maximum(reduced * reduced + 4.0 * a2 * rays.q, 0.0))
         with np.errstate(invalid="ignore", divide="ignore"):
             base = np.where(reduced < 0.0, 2.0 * a2 * rays.q / (root - reduced), 0.5 * (reduced + root))

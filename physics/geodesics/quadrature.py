@@ -20,14 +20,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Indices, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Indices
 from .mino import direct_polynomial, radial_polynomial, turning_polynomial
-
-Index = NDArray[np.intp]
 
 # The rules that are used: rays are sorted into classes by the nodes that they need. At the default tolerance nine of
 # ten need 7 to 10; the others are so few that more classes would cost more than nodes that are not needed.
@@ -54,12 +54,8 @@ ROOT_ROUNDS = 3
 MOST_PLAIN_NODES = 14
 
 
-gauss_legendre: Callable[[int], tuple[Array, Array]] = np.polynomial.legendre.leggauss
-"""From a number of nodes to the nodes in [-1, 1] and their weights."""
-
-
 def _rule(count: int) -> tuple[list[float], list[float]]:
-    nodes, weights = gauss_legendre(count)
+    nodes, weights = leggauss(count)
     return nodes.tolist(), weights.tolist()
 
 
@@ -209,7 +205,7 @@ def _apply(
     nodes_and_weights = RULES[count]
     rates, unit, spin, argument = integrand.rates[:, rays], integrand.unit[rays], integrand.spin, integrand.argument
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
-    a2, drag_b = spin * spin, spin * integrand.b[rays]
+    a2, a_b = spin * spin, spin * integrand.b[rays]
     time, psi = np.zeros_like(unit), np.zeros_like(unit)
     # Node by node for the rules that most rays need; all nodes at once for the others, whose rays are few.
     passes: Iterable[tuple[float | Array, float | Array]] = zip(*nodes_and_weights, strict=True)
@@ -243,7 +239,7 @@ def _apply(
         below -= 2.0
         below *= z
         below += 1.0
-        above = drag_b * z
+        above = a_b * z
         above -= 2.0
         above *= z
         speed *= below

@@ -15,18 +15,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial.legendre import leggauss
 
 from ..kerr.critical_curve import Barrier
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Mask
 from ..numerics.weierstrass import QuarticMotion, Weierstrass, acceleration
 from .mino import radial_polynomial
-from .quadrature import gauss_legendre, negative_root
+from .quadrature import negative_root
 from .radial_path import TAIL, Places, along_parabola, beyond_horizon, winding
 from .radial_path import places_of_rays as places_by_series
-
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 # Tightest tolerance that is served: where rays part next to the critical curve rounding costs up to 1e-7 of u.
 TIGHTEST = 3e-7
@@ -86,7 +84,7 @@ class _Rule:
     @classmethod
     def of(cls, count: int) -> _Rule:
         """Return the rule of an even number of nodes."""
-        nodes, weights = gauss_legendre(count)
+        nodes, weights = leggauss(count)
         polynomials = [np.ones(count), nodes]
         for n in range(1, count - 1):
             polynomials.append(((2 * n + 1) * nodes * polynomials[n] - n * polynomials[n - 1]) / (n + 1))
@@ -116,7 +114,7 @@ class _Paths:
         self._constants = constants
         self.quartic: Array = constants[:3]
         """c_2, c_3, c_4 of U, shape (3, n)."""
-        self.slope, self.b, self.drag, inward, self.lowest, self.pace = constants[3:]
+        self.slope, self.b, self.carter_k, inward, self.lowest, self.pace = constants[3:]
         """du / dlambda at the camera; p_phi; q + (b - a)^2; U's negative root, to some per cent, where rays stay that
         have gone beyond infinity; how fast the ray's direction turns, radians per Mino time."""
         self.inward: Mask = inward > 0.0
@@ -135,10 +133,10 @@ class _Paths:
                     *quartic,
                     rays.radial * (start * start),
                     rays.b,
-                    rays.carter + spin * (spin - 2.0 * rays.b),
+                    rays.q_plus_b2 + spin * (spin - 2.0 * rays.b),
                     ~barrier.blocks & (rays.radial >= 0.0),
                     -negative_root(rays),
-                    np.sqrt(np.maximum(rays.carter + spin * spin, 0.0)),
+                    np.sqrt(np.maximum(rays.q_plus_b2 + spin * spin, 0.0)),
                 ]
             )
             return cls(spin, start, Weierstrass.of_quartic(*quartic), constants, np.empty(0))
@@ -177,7 +175,7 @@ class _Paths:
         p = square * (a * (a - self.b))
         p += 1.0
         p += np.abs(slope)
-        square *= self.drag
+        square *= self.carter_k
         # 1 - 2 u + a^2 u^2
         delta = u * (a * a)
         delta -= 2.0

@@ -36,12 +36,10 @@ from numpy.typing import NDArray
 
 from ..kerr.critical_curve import Barrier
 from ..kerr.metric import horizon_radius
-from ..kerr.rays import Array, Rays
+from ..kerr.rays import Rays
+from ..numerics.arrays import Array, Index, Mask
 from .mino import direct_polynomial, inner_turning_polynomial, turning_polynomial
 from .quadrature import negative_root
-
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 # Chebyshev points that are tried, one number after another; most rays need no more than the first. Few will do where
 # the tolerance is at least this; straight into the hole the integrands are less smooth.
@@ -93,8 +91,8 @@ class RadialPath:
     sign: float
     """-1 for rays that end at infinity, 1 for those that end at the horizon."""
     b: Array
-    drag: Array
-    """q + (b - a)^2."""
+    carter_k: Array
+    """Carter's constant in the form K = q + (b - a)^2, units of M^2 (Carter 1968, Phys. Rev. 174, 1559)."""
     rates: Array
     """Polynomial of x'^2 in x or x^2, low powers first, shape (4 or 5, n)."""
     unit: Array
@@ -154,7 +152,7 @@ class RadialPath:
             return plain
         slope = self.unit * speed * (2.0 * np.abs(x) if self.squared else 1.0)
         p = 1.0 + a * (a - self.b) * u * u
-        rate: Array = a - a * self.drag * u * u / (p + slope)
+        rate: Array = a - a * self.carter_k * u * u / (p + slope)
         if self.squared:
             # before the turning point the ray goes out
             rate = np.where(x < 0.0, a - a * (p + slope) / self._delta(u), rate)
@@ -201,8 +199,8 @@ def paths_of(rays: Rays, barrier: Barrier) -> list[tuple[Index, RadialPath]]:
 
 def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPath:
     a = rays.spin
-    pace = np.sqrt(np.maximum(rays.carter + a * a, 0.0))
-    drag = rays.carter + a * (a - 2.0 * rays.b)
+    pace = np.sqrt(np.maximum(rays.q_plus_b2 + a * a, 0.0))
+    carter_k = rays.q_plus_b2 + a * (a - 2.0 * rays.b)
     with np.errstate(divide="ignore", invalid="ignore"):
         root = negative_root(rays)
         if squared:
@@ -221,7 +219,7 @@ def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPat
         far = 1.0 + root / unit
         if squared:
             end, far = np.sqrt(np.maximum(end, 0.0)), np.sqrt(far)
-    return RadialPath(a, squared, sign, rays.b, drag, rates, unit, start, end, far, near, pace)
+    return RadialPath(a, squared, sign, rays.b, carter_k, rates, unit, start, end, far, near, pace)
 
 
 def beyond_horizon(spin: float) -> float:

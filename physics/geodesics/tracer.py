@@ -6,25 +6,24 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kerr.critical_curve import Barrier, comes_from_sky, find_barrier
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, Rays, camera_directions, indices, rays_from_camera
+from ..kerr.rays import Rays, camera_directions, rays_from_camera
+from ..numerics.arrays import Array, indices
+from ..numerics.blocks import blocks
 from ..numerics.checks import number, shown, whole
-from ..numerics.errors import BlackHoleError, Cancelled
+from ..numerics.errors import BlackHoleError
 from ..numerics.runge_kutta import CASH_KARP, Integration, System, Tableau, integrate
 from ..numerics.sphere import celestial_coordinates
+from ..numerics.work import Cancel, Progress, drain
 from .boyer_lindquist import PrintedSystem
 from .closed_form import sky_directions
 from .mino import DirectRays, TurningRays
-
-Progress = Callable[[float], object]
-Cancel = Callable[[], bool]
-Result = TypeVar("Result")
 
 # Error of direction, radians: of the whole ray for quadrature, of one step for the methods that take steps. Either way
 # it leaves medians of about 1e-7 rad.
@@ -32,10 +31,6 @@ DEFAULT_TOLERANCE = 1e-6
 # Below this a step's error estimate is rounding noise, and step control stalls.
 SMALLEST_TOLERANCE = 1e-13
 LARGEST_TOLERANCE = 1e-2
-
-# Rays traced at a time: this bounds the memory (up to 1 kB a ray, for steps). Smaller blocks waste time on the few rays
-# of each that need most work, larger ones leave the cache.
-BLOCK_SIZE = 32768
 
 # Attempted steps before a ray is given up as UNRESOLVED, where a method takes steps. With Cash-Karp ordinary rays take
 # 5 to 40; each decade of closeness to the critical curve adds some 10 at the default tolerance, up to 150 or so at
@@ -285,35 +280,6 @@ def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_S
         raise BlackHoleError(f"There is no method {shown(method)}; choose one of {', '.join(METHODS)}.")
     if max_steps < 1:
         raise BlackHoleError(f"The number of steps is {max_steps}; it must be at least 1.")
-
-
-def blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most BLOCK_SIZE that cover `count` items."""
-    for start in range(0, count, BLOCK_SIZE):
-        yield slice(start, min(start + BLOCK_SIZE, count))
-
-
-def drain(
-    steps: Generator[float, None, Result], progress: Progress | None = None, cancel: Cancel | None = None
-) -> Result:
-    """Run a generator of fractions to its end and return what it returns.
-
-    Raises
-    ------
-    Cancelled
-        When `cancel` returned true before a step.
-    """
-    while True:
-        if cancel is not None and cancel():
-            steps.close()
-            raise Cancelled("The work was canceled.")
-        try:
-            fraction = next(steps)
-        except StopIteration as end:
-            result: Result = end.value
-            return result
-        if progress is not None:
-            progress(fraction)
 
 
 def last(rounds: Iterator[Integration | None]) -> Integration:

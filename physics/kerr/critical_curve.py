@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which rays come from the sky and which from the hole: trapped photon orbits and the shadow's edge.
+"""Which rays come from the sky and which from the hole: spherical photon orbits and the shadow's edge.
 
 Equations 9 to 12 of Verbraeck & Eisemann, "Raytracing Equations" (after James et al. 2015, appendix A). Their
 flowchart compares b and q with the orbits at constant radius, found as roots of Eq. 9; that loses its
@@ -20,11 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import by_component, cos_sin
 from .metric import check_spin, circular_photon_radius, horizon_radius
 from .observer import Observer
-from .rays import Array, Indices, Rays, rays_from_triad
+from .rays import Rays, rays_from_triad
 
 # Newton's method at most doubles its digits: this many rounds serve any start.
 NEWTON_ROUNDS = 60
@@ -67,8 +68,8 @@ class Barrier:
 def find_barrier(rays: Rays) -> Barrier:
     """Return the outermost minimum of Eq. 3's R for each ray, in closed form."""
     a, r_cam = rays.spin, rays.observer.r
-    linear = 0.5 * (a * a - rays.carter)  # A
-    constant = 0.5 * (rays.carter + a * a - 2.0 * a * rays.b)  # C
+    linear = 0.5 * (a * a - rays.q_plus_b2)  # A
+    constant = 0.5 * (rays.q_plus_b2 + a * a - 2.0 * a * rays.b)  # C
     third = np.sqrt(np.maximum(-linear, 0.0) / 3.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         # 3 C / (2 A sqrt(-A/3)) = -C / (2 sqrt(-A/3)^3); below -1 there is no minimum, and the formula, held at
@@ -87,7 +88,7 @@ def find_barrier(rays: Rays) -> Barrier:
     offset = r_cam - radius
     reach_squared = offset * (slope + offset * (curvature + offset * (4.0 * radius + offset)))
     reach = np.copysign(np.sqrt(np.maximum(reach_squared, 0.0)), offset)
-    # R(r_m) = R(r_cam) - Y^2 cancels less than the polynomial for a camera among the trapped orbits, where the
+    # R(r_m) = R(r_cam) - Y^2 cancels less than the polynomial for a camera among the spherical photon orbits, where the
     # critical curve is crossed with p_r near 0.
     near = (reach_squared >= 0.0) & (rays.radial**2 + reach_squared < square * square)
     height = np.where(near, (rays.radial - reach) * (rays.radial + reach), height)
@@ -140,6 +141,28 @@ def around_hole(away: Array, aside: Array, up: Array) -> Array:
     return by_component(-cosine, sine * aside, sine * up)
 
 
+def position_angles(light: Array) -> tuple[Array, Array]:
+    """Return where a FIDO sees light, relative to the hole's direction: the inverse of `around_hole`.
+
+    Parameters
+    ----------
+    light : ndarray, shape (3, n)
+        Where the light runs in the FIDO's frame, on (r-hat, theta-hat, phi-hat).
+
+    Returns
+    -------
+    away : ndarray, shape (n,)
+        Angle from the hole's direction, radians, [0, pi].
+    angle : ndarray, shape (n,)
+        Position angle about the hole's direction, radians, [0, 2 pi].
+    """
+    outward, aside, up = light
+    away: Array = np.arctan2(np.sqrt(aside * aside + up * up), outward)
+    angle = np.arctan2(-up, -aside)
+    angle += (angle < 0.0) * (2.0 * math.pi)
+    return away, angle
+
+
 def edge_angles(
     spin: float, fido: Observer, aside: Array, up: Array, error: float, about: tuple[Array, float] | None = None
 ) -> Array:
@@ -183,15 +206,15 @@ def edge_angles(
     return high
 
 
-def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
-    """Return the constants b0, q0 of the photon orbits at constant radius r_0 (Eq. 9).
+def spherical_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
+    """Return the constants b0, q0 of the spherical photon orbits, whose radius r_0 is constant (Eq. 9).
 
     Parameters
     ----------
     spin : float
         Kerr parameter, not 0: there the orbits share one radius, 3, and have b^2 + q = 27.
     radius : array_like
-        r_0 between the r_1 and r_2 of `trapped_radii`, units of M.
+        r_0 between the r_1 and r_2 of `spherical_orbit_radii`, units of M.
 
     Returns
     -------
@@ -205,20 +228,22 @@ def trapped_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
     """
     a = check_spin(spin)
     if a == 0.0:
-        raise BlackHoleError("Eq. 9 divides by the spin: without spin every trapped orbit has r = 3 and b^2 + q = 27.")
+        raise BlackHoleError(
+            "Eq. 9 divides by the spin: without spin every spherical photon orbit has r = 3 and b^2 + q = 27."
+        )
     r = np.asarray(radius, dtype=np.float64)
     b0 = -(r**3 - 3.0 * r**2 + a * a * r + a * a) / (a * (r - 1.0))
     q0 = -(r**3) * (r**3 - 6.0 * r**2 + 9.0 * r - 4.0 * a * a) / (a * a * (r - 1.0) ** 2)
     return b0, q0
 
 
-def trapped_radii(spin: float) -> tuple[float, float]:
+def spherical_orbit_radii(spin: float) -> tuple[float, float]:
     """Return r_1 and r_2, the radii of the prograde and retrograde circular photon orbits (Eq. 10)."""
     a = check_spin(spin)
     return circular_photon_radius(a), circular_photon_radius(-a)
 
 
-def trapped_impact_parameters(spin: float) -> tuple[float, float]:
+def critical_impact_parameters(spin: float) -> tuple[float, float]:
     """Return b_1 = b0(r_2) < b_2 = b0(r_1), the ends of the range of Eq. 11, in closed form.
 
     b0(r_1) = -a + 6 cos(arccos(-a)/3), b0(r_2) = -a - 6 cos(arccos(a)/3): good at spin 0 as well, where
@@ -228,8 +253,8 @@ def trapped_impact_parameters(spin: float) -> tuple[float, float]:
     return -a - 6.0 * math.cos(math.acos(a) / 3.0), -a + 6.0 * math.cos(math.acos(-a) / 3.0)
 
 
-def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
-    """Return q0(b), Carter's constant of the trapped orbit with impact parameter b (Eqs. 9, 11).
+def critical_carter_constant(spin: float, b: ArrayLike) -> Array:
+    """Return q0(b), Carter's constant of the spherical photon orbit with impact parameter b (Eqs. 9, 11).
 
     b0(r_0) = b is the cubic x^3 + (a^2 + a b - 3) x + 2 (a^2 - 1) = 0 in x = r_0 - 1, whose positive root is
     wanted; Carter's constant follows from R'(r_0) = 0 rather than from Eq. 9, so that a = 0 needs no case.
@@ -238,7 +263,7 @@ def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
     ----------
     spin : float
     b : array_like
-        Impact parameters between the ends given by `trapped_impact_parameters`, units of M.
+        Impact parameters between the ends given by `critical_impact_parameters`, units of M.
 
     Returns
     -------
@@ -248,13 +273,13 @@ def trapped_carter_constant(spin: float, b: ArrayLike) -> Array:
     Raises
     ------
     BlackHoleError
-        For an impact parameter outside that range, which has no trapped orbit.
+        For an impact parameter outside that range, which no spherical photon orbit has.
     """
     a = check_spin(spin)
     b = np.asarray(b, dtype=np.float64)
-    low, high = trapped_impact_parameters(a)
+    low, high = critical_impact_parameters(a)
     if np.any((b < low) | (b > high)):
-        raise BlackHoleError(f"Trapped orbits have impact parameters between {low:.6g} and {high:.6g} only.")
+        raise BlackHoleError(f"Spherical photon orbits have impact parameters between {low:.6g} and {high:.6g} only.")
     linear, constant = a * a + a * b - 3.0, 2.0 * (a * a - 1.0)
     # The constant is negative, so there is one positive root and the cubic is convex to its right: Newton's method
     # from above the root comes down to it without leaving the right side of the asymptote r_0 = 1.

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array
 from .metric import check_spin, horizon_radius, isco_radius
-from .rays import Array
 
 
 def matter_direction(spin: float, retrograde: bool = False) -> float:
@@ -106,12 +106,12 @@ def _falling(a: float, r: Array, b: Array, energy: Array, radial: Array, isco: f
     matter_energy, momentum = circular_constants(a, isco)
     outer = horizon_radius(a)
     delta = (r - outer) * (r - a * a / outer)
-    drag = momentum - a * matter_energy
+    l_minus_ae = momentum - a * matter_energy
     p = matter_energy * (r * r + a * a) - a * momentum
-    inward = np.sqrt(np.maximum(p * p - delta * (r * r + drag * drag), 0.0))
+    inward = np.sqrt(np.maximum(p * p - delta * (r * r + l_minus_ae * l_minus_ae), 0.0))
     light = energy * (r * r + a * a) - a * b
     # -p . u = [(P p - Delta p_r r^2 u^r) / Delta - (b - a E)(L - a E)] / r^2, all of it multiplied out from BPT 2.9
-    product: Array = ((light * p + radial * inward) / delta - (b - a * energy) * drag) / (r * r)
+    product: Array = ((light * p + radial * inward) / delta - (b - a * energy) * l_minus_ae) / (r * r)
     return product
 
 

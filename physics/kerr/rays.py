@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..numerics.arrays import Array, Indices
 from ..numerics.sphere import unit_vectors
 from .metric import MetricFunctions, axis_safe_sin, check_spin, metric_functions
 from .observer import Observer
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp] | slice
 
 # Energy at infinity, per energy in the FIDO's frame, that stands for none: its constants of motion stay finite.
 LEAST_ENERGY = 1e-12
@@ -37,8 +35,8 @@ class Rays:
     observer: Observer
     b: Array
     """Constant of motion p_phi, units of M (Eq. 8)."""
-    carter: Array
-    """q + b^2 of Eq. 8 in units of M^2: unlike q it is regular on the axis."""
+    q_plus_b2: Array
+    """q + b^2 of Eq. 8, units of M^2: unlike q it is regular on the axis."""
     radial: Array
     """Delta p_r (Eq. 7) in units of M^2: its square is R(r_cam) of Eq. 3; > 0 for outgoing light."""
     polar: Array
@@ -53,7 +51,7 @@ class Rays:
     @property
     def q(self) -> Array:
         """Carter's constant q of Eq. 8, units of M^2."""
-        return self.carter - self.b * self.b
+        return self.q_plus_b2 - self.b * self.b
 
     def __len__(self) -> int:
         return len(self.b)
@@ -64,18 +62,13 @@ class Rays:
             self.spin,
             self.observer,
             self.b[chosen],
-            self.carter[chosen],
+            self.q_plus_b2[chosen],
             self.radial[chosen],
             self.polar[chosen],
             self.azimuthal[chosen],
             self.escapes[chosen],
             self.one_plus_z[chosen],
         )
-
-
-def indices(members: NDArray[np.bool_]) -> Indices:
-    """Return the indices of members of shape (n,): a slice where all are, which selects without copying."""
-    return slice(None) if members.all() else np.flatnonzero(members)
 
 
 def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:
@@ -205,9 +198,9 @@ def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
     e_x, e_y, e_z = camera_triad(observer)
     beta = observer.beta
     gamma = 1.0 / math.sqrt((1.0 - beta) * (1.0 + beta))
-    drag = metric.omega * metric.varpi
-    constant = gamma * (metric.alpha + drag * e_y[2] * beta)
-    on_x, on_y, on_z = -drag * e_x[2], -gamma * (metric.alpha * beta + drag * e_y[2]), -drag * e_z[2]
+    dragging = metric.omega * metric.varpi
+    constant = gamma * (metric.alpha + dragging * e_y[2] * beta)
+    on_x, on_y, on_z = -dragging * e_x[2], -gamma * (metric.alpha * beta + dragging * e_y[2]), -dragging * e_z[2]
     return constant, on_x * e_x + on_y * e_y + on_z * e_z
 
 
@@ -239,7 +232,7 @@ def _rays_from_fido(
         spin=sign * spin,
         observer=observer,
         b=azimuthal * axis_safe_sin(observer.theta),
-        carter=polar * polar + azimuthal * azimuthal - a_cos * a_cos,
+        q_plus_b2=polar * polar + azimuthal * azimuthal - a_cos * a_cos,
         radial=fido_energy * metric.rho * math.sqrt(metric.delta) * n_r,
         polar=polar,
         azimuthal=azimuthal,

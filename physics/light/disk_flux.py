@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kerr.metric import check_spin, isco_radius
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 from ..numerics.checks import shown
 from ..numerics.errors import BlackHoleError
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 from ..numerics.checks import finite
 from ..numerics.errors import BlackHoleError
 from ..shot.disk import Disk

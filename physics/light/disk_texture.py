@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kerr.orbiting_matter import orbital_frequency
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 
 TEXTURE_WIDTH, TEXTURE_HEIGHT = 2048, 512
 

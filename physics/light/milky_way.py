@@ -28,9 +28,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from ..numerics.arrays import Array
 
 STAR_HEIGHT = 300.0  # pc
 STAR_LENGTH = 2600.0  # pc

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..numerics.arrays import Array
 from .color import SECOND_RADIATION_CONSTANT
-
-Array = NDArray[np.float64]
 
 UNKNOWN_COLOR_INDEX = 0.45
 """B-V taken where none was measured: a white star of about 6600 K."""

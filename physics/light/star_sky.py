@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from .milky_way import COLOR_INDEX, unresolved_glow
 from .star_color import black_body_color, temperature_from_color_index
-
-Array = NDArray[np.float64]
 
 CATALOG = Path(__file__).parent / "data" / "stars_xhip.npz"
 FAINTEST = 8.0

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geodesics.exit_lines import check_exit_method, exit_lines
-from ..geodesics.tracer import BLOCK_SIZE, Cancel, Fate, Progress, drain
-from ..kerr.rays import Array
+from ..geodesics.tracer import Fate
+from ..numerics.arrays import Array, Image
+from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.work import Cancel, Progress, drain
 from ..sampling.tiles import Tiles, interpolate
 from ..shot.map_parameters import WarpMapParameters
 from .lens import DEFAULT_SPHERE_RADIUS
@@ -25,8 +27,6 @@ IMPACT_SCALE = DEFAULT_SPHERE_RADIUS
 # Error of direction allowed to bilinear interpolation between pixel centers, radians: a tenth of a pixel of common
 # pictures. Where it would be more, a pixel is marked as not usable, and the camera follows the ray itself.
 BILINEAR_TOLERANCE = 5e-5
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

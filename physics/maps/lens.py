@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kerr.rays import Array, redshift_vector
+from ..kerr.rays import redshift_vector
+from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import spherical_triad
 from ..shot.cameras import Camera, PanoramaCamera

@@ -3,22 +3,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE, trace_block
-from ..kerr.rays import Array
+from ..geodesics.tracer import trace_block
+from ..numerics.angles import wrap_once
+from ..numerics.arrays import Array, Image, Mask
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.sphere import celestial_coordinates
-from ..sampling.tiles import POINTS, TILE_SIDES, Tiles, interpolate, sample, sides_for, tiles_of
+from ..sampling.tiles import POINTS, TILE_SIDES, Tiles, interpolate, pool, sample, sides_for, tiles_of
 from ..sampling.view import View
 from ..sampling.visibility import CENTER_REACH, cells_for_shadow, center_block, near_edge, refine
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters
-from .sky_table import SkyTable
 
 # What pixels without any sky carry for 1 + z: no redshift. 0 is kept for "no valid map".
 SHADOW_ONE_PLUS_Z = 1.0
@@ -35,17 +33,13 @@ TRACED_SIDE = 128
 # Points that one chord of the shadow's outline is divided into, at the most.
 MOST_PIECES = 100_000
 
-Image = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-
 
 class Painting:
-    """A warp map in the making; with a table of the same place it traces only what that leaves open."""
+    """A warp map in the making."""
 
-    def __init__(self, parameters: WarpMapParameters, table: SkyTable | None = None, view: View | None = None) -> None:
+    def __init__(self, parameters: WarpMapParameters, view: View | None = None) -> None:
         """`view`: of these parameters, if there is one already."""
         self._parameters = parameters
-        self._table = table
         self._view = View(parameters) if view is None else view
         self._width, self._height = parameters.map_size
         shape = (self._height, self._width)
@@ -53,7 +47,6 @@ class Painting:
         self._one_plus_z = np.full(shape, SHADOW_ONE_PLUS_Z, np.float32)
         self._unresolved = 0
         self._rays = 0
-        self._shared = 0
 
     @property
     def planes(self) -> tuple[Image, Image, Image, Image]:
@@ -61,7 +54,7 @@ class Painting:
         return self._theta, self._phi, self._one_plus_z, self._visibility
 
     def counts(self) -> dict[str, int]:
-        """Number of pixels by what they see, of the rays traced for them, and of those that a table stood for."""
+        """Number of pixels by what they see, and of the rays traced for them."""
         whole = int(np.count_nonzero(self._visibility == 1.0))
         dark = int(np.count_nonzero(self._visibility == 0.0))
         return {
@@ -70,7 +63,7 @@ class Painting:
             "shadow": dark,
             "unresolved": self._unresolved,
             "rays": self._rays,
-            "shared": self._shared,
+            "shared": 0,
         }
 
     def steps(self) -> Generator[float, None, None]:
@@ -167,18 +160,7 @@ class Painting:
         return direction.T
 
     def _block_directions(self, x: Array, y: Array) -> Array:
-        """Do what `_directions` does for one block."""
-        if self._table is None:
-            return self._trace_rays(x, y)
-        direction = self._table.directions(self._view.light(x, y), self._view.phi)
-        left = np.flatnonzero(np.isnan(direction[:, 0]))
-        self._shared += len(x) - len(left)
-        if len(left):
-            direction[left] = self._trace_rays(x[left], y[left])
-        return direction
-
-    def _trace_rays(self, x: Array, y: Array) -> Array:
-        """Return what `_directions` does, a ray for each."""
+        """Return the same as `_directions`, for one block."""
         _, direction = trace_block(self._view.rays(x, y), self._parameters.tolerance, self._parameters.method)
         self._rays += len(x)
         return direction
@@ -194,7 +176,7 @@ class Painting:
     def _interpolate_group(self, tiles: Tiles, coefficients: Array) -> None:
         x, y, z = interpolate(coefficients, tiles.side, self._view.hole_to_world)
         theta = np.arctan2(np.sqrt(x * x + y * y), z)
-        phi = wrapped(np.arctan2(y, x))
+        phi = wrap_once(np.arctan2(y, x))
         columns, rows = tiles.pixels()
         one_plus_z = self._view.one_plus_z(columns.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         for plane, values in zip(self.planes, (theta, phi, one_plus_z, np.ones_like(theta)), strict=True):
@@ -228,7 +210,7 @@ class Painting:
             one_plus_z = self._view.one_plus_z(x[pixel], y[pixel])
             place = (rows[pixel], columns[pixel])
             self._theta[place] = np.where(lost, 0.0, theta)
-            self._phi[place] = wrapped(np.where(lost, 0.0, phi))
+            self._phi[place] = wrap_once(np.where(lost, 0.0, phi))
             self._one_plus_z[place] = np.where(lost, UNRESOLVED_ONE_PLUS_Z, one_plus_z)
             self._unresolved += int(np.count_nonzero(lost))
             yield 0.2 + 0.8 * (start + len(pixel)) / len(traced)
@@ -260,34 +242,3 @@ class Painting:
                     block_column[held], block_row[held], self._view.edge, cells_for_shadow(center, self._view.edge)
                 )
         return visibility, x, y
-
-
-def pool(mask: Mask, cells: int) -> Mask:
-    """Return whether any cell is set in each square of `cells` x `cells`."""
-    rows, columns = (-(-size // cells) for size in mask.shape)
-    padded = np.zeros((rows * cells, columns * cells), dtype=bool)
-    padded[: mask.shape[0], : mask.shape[1]] = mask
-    pooled: Mask = padded.reshape(rows, cells, columns, cells).any(axis=(1, 3))
-    return pooled
-
-
-def wrapped(phi: NDArray[np.floating[Any]]) -> Image:
-    """Return angles from -pi to 2 pi brought to [0, 2 pi) in single precision, which rounds some up to 2 pi itself."""
-    turn = 2.0 * math.pi
-    single = (phi + (phi < 0.0) * phi.dtype.type(turn)).astype(np.float32)
-    single *= single < np.float32(turn)
-    return single
-
-
-def in_circle(phi: NDArray[np.floating[Any]]) -> Image:
-    """Return any angles brought to [0, 2 pi) in single precision."""
-    turn = phi.dtype.type(2.0 * math.pi)
-    single = phi.astype(np.float32, copy=False)
-    if single.size and single.min() >= 0.0 and single.max() < np.float32(turn):
-        return single
-    rest = np.floor(phi * (1.0 / turn))
-    rest *= turn
-    np.subtract(phi, rest, out=rest)
-    single = rest.astype(np.float32, copy=False)
-    single[(single < 0.0) | (single >= np.float32(turn))] = 0.0  # by rounding
-    return single

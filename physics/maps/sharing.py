@@ -3,9 +3,8 @@
 
 Space around the hole looks the same from every azimuth. When only the camera's azimuth changes from one frame to
 the next, as on a circular orbit with the camera tracking the hole, or when hole and camera are turned together, each
-pixel's ray is the same but for a rotation of where it comes from: one map serves for all such frames. When the camera
-stays at one radius and polar angle but turns, zooms or changes its speed, the pixels see other directions of one sky,
-and a table of that sky serves them (see `sky_table`).
+pixel's ray is the same but for a rotation of the direction it comes from: one map serves all such frames. Frames of
+other moves share nothing.
 """
 
 from __future__ import annotations
@@ -17,68 +16,52 @@ from collections.abc import Generator
 import numpy as np
 
 from ..disk_passes.disk_pass import DiskPass
-from ..kerr.rays import Array
+from ..numerics.angles import wrap_once
+from ..numerics.arrays import Array
 from ..numerics.sphere import celestial_coordinates, spherical_triad, unit_vectors
 from ..shot.map_parameters import WarpMapParameters
-from .painting import wrapped
-from .sky_table import SkyTable, same_place, sky_table_steps
 from .warp_map import WarpMap, bake_steps
-
-# Rays that a table must stand for, for each that is traced all the same, to be worth asking.
-WORTHWHILE = 2.0
 
 # Difference between cameras that counts as none, in pixels.
 PIXEL_SHARE = 0.01
 
 
 class MapBaker:
-    """Bakes the maps of a shot one after another, with what they have in common traced once.
+    """Bakes the maps of a shot one after another, and traces once what they have in common.
 
-    A map is made from an earlier one by a rotation where that is possible, and from a table of the sky from the second
-    map on that is seen from one place. Either way its errors stay within the tolerance that its parameters allow to
-    interpolation; with an `interpolation` of 0 every map is traced whole. Moves that share nothing cost nothing more.
+    A map is made from an earlier one by a rotation where `turned_map` allows it, and traced otherwise.
     """
 
     def __init__(self) -> None:
         self._traced: WarpMap | None = None
-        self._table: SkyTable | None = None
-        self._useless = False
-        """Whether the table has answered too few questions; it is kept, so as not to be made again."""
 
     def steps(self, parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
-        """Bake one map as `bake_steps` does."""
+        """Bake one map step by step.
+
+        Parameters
+        ----------
+        parameters : WarpMapParameters
+
+        Yields
+        ------
+        float
+            The fraction done, 0 to 1, after each block of rays.
+
+        Returns
+        -------
+        WarpMap
+
+        Raises
+        ------
+        BlackHoleError
+            Before the first step, if no map can be made from these parameters.
+        """
         if self._traced is not None:
             turned = turned_map(self._traced, parameters)
             if turned is not None:
                 return turned
-        table = yield from self._table_for(parameters)
-        traced = yield from bake_steps(parameters, table)
-        self._traced = traced
-        if table is not None and traced.counts["shared"] < WORTHWHILE * traced.counts["rays"]:
-            self._useless = True
-        return traced
-
-    def _table_for(self, parameters: WarpMapParameters) -> Generator[float, None, SkyTable | None]:
-        if parameters.interpolation == 0.0 or self._traced is None:
-            return None
-        parameters.validate()
-        if self._table is None or not self._table.serves(parameters):
-            before = WarpMapParameters.from_metadata(self._traced.metadata["parameters"])
-            self._table, self._useless = None, False
-            if same_place(before, parameters):
-                self._table = yield from _before(sky_table_steps(parameters))
-        return None if self._useless else self._table
-
-
-def _before(steps: Generator[float, None, SkyTable]) -> Generator[float, None, SkyTable]:
-    """Do what comes before a map: its own progress has not begun."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            table: SkyTable = end.value
-            return table
-        yield 0.0
+        self._traced = yield from bake_steps(parameters)
+        return self._traced
 
 
 def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | None:
@@ -126,7 +109,7 @@ def turned_pass(earlier: DiskPass, azimuth: float, metadata: dict[str, object]) 
     """Return a disk's pass for a camera whose azimuth is larger by `azimuth` radians; everything else stays."""
     seen = earlier.coverage > 0.0
     phi = earlier.phi.copy()
-    phi[seen] = wrapped((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))
+    phi[seen] = wrap_once((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))
     return dataclasses.replace(earlier, phi=phi, metadata={**metadata, "crossing": earlier.metadata["crossing"]})
 
 
@@ -163,8 +146,8 @@ def _rotated(warp_map: WarpMap, rotation: Array, metadata: dict[str, object]) ->
     theta, phi = warp_map.theta.copy(), warp_map.phi.copy()
     turn = math.atan2(rotation[1, 0], rotation[0, 0])
     if np.abs(rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-12:
-        phi[seen] = wrapped((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
+        phi[seen] = wrap_once((phi[seen].astype(np.float64) + turn) % (2.0 * math.pi))
     else:
         turned_theta, turned_phi = celestial_coordinates(unit_vectors(theta[seen], phi[seen]) @ rotation.T)
-        theta[seen], phi[seen] = turned_theta, wrapped(turned_phi)
+        theta[seen], phi[seen] = turned_theta, wrap_once(turned_phi)
     return WarpMap(theta, phi, warp_map.one_plus_z, warp_map.visibility, metadata)

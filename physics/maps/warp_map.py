@@ -7,18 +7,13 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..disk_passes.disk_painting import DiskPainting
 from ..disk_passes.disk_pass import DiskPass
-from ..geodesics.tracer import Cancel, Progress, drain
+from ..numerics.arrays import Image
+from ..numerics.work import Cancel, Progress, drain
 from ..sampling.view import View
 from ..shot.map_parameters import WarpMapParameters
 from .painting import Painting
-from .sky_table import SkyTable
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -42,7 +37,7 @@ class WarpMap:
     def counts(self) -> dict[str, int]:
         """Pixels by what they see: ``sky``, ``edge`` (partly), ``shadow``, ``unresolved``.
 
-        And ``rays`` that were traced for them, and ``shared``, rays that an earlier map or a table stood for.
+        And ``rays`` traced for them, and ``shared``: rays that were traced for an earlier map instead.
         """
         counts: dict[str, int] = self.metadata["counts"]
         return counts
@@ -69,10 +64,8 @@ def bake(parameters: WarpMapParameters, *, progress: Progress | None = None, can
     return drain(bake_steps(parameters), progress, cancel)
 
 
-def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> Generator[float, None, WarpMap]:
+def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
     """Trace a warp map step by step: yields the fraction done after each block of rays, returns the map.
-
-    A table of the same place, see `SkyTable.serves`, stands for most of the rays.
 
     The steps take some tens of milliseconds each, so that a window can be kept alive between them.
 
@@ -83,7 +76,7 @@ def bake_steps(parameters: WarpMapParameters, table: SkyTable | None = None) -> 
     """
     parameters.validate()
     view = View(parameters)
-    painting = Painting(parameters, table, view)
+    painting = Painting(parameters, view)
     metadata: dict[str, Any] = {"hash": parameters.hash, "parameters": parameters.to_metadata()}
     if parameters.disk is None:
         yield from painting.steps()

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lensed sky of one place as a picture that a World shader can look up, whichever way the camera is turned.
 
-The coordinates are those of `sky_table`: across, the position angle psi about the hole's direction; up, the logarithm
-of the distance from the shadow's edge. So a small picture is fine where the sky is crowded, the shadow's edge is a
-function and not a row of pixels, and the map has no poles and no seam: psi is a circle, and the directions are kept as
-vectors. The bottom row is a header with the numbers that lead from a direction to a place in the map. All of this is
-in the axes of the scene's world.
+Across runs the position angle psi about the hole's direction; up runs s = ln(delta) + delta, where delta is the
+distance from the shadow's edge. Around the edge the sky winds up without end, by equal angles for equal factors in
+delta; s is the logarithm next to the edge and plain far from it, so that directions turn at nearly one rate everywhere.
+So a small picture is fine where the sky is crowded, the shadow's edge is a function and not a row of pixels, and the
+map has no poles and no seam: psi is a circle, and directions are kept as vectors. The bottom row is a header with the
+numbers that lead from a direction to a place in the map. All of this is in the axes of the scene's world.
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geodesics.tracer import BLOCK_SIZE, Fate, trace_block
+from ..geodesics.tracer import Fate, trace_block
 from ..kerr.critical_curve import around_hole, edge_angles
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, rays_from_triad, redshift_vector
+from ..kerr.rays import rays_from_triad, redshift_vector
+from ..numerics.arrays import Array, Image
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.sphere import cos_sin, spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import IDENTITY, WarpMapParameters
-from .sky_table import distances
 
 # Sizes of the grid: position angles, and places between the edge and the opposite point of the sky.
 FINAL = (512, 431)
@@ -37,6 +39,9 @@ CLOSEST = 1e-3
 # How well the edge's place is found, radians: single precision has no more of it.
 EDGE_ERROR = 1e-9
 
+# Newton's method doubles its correct digits in each round: this many rounds serve any start.
+NEWTON_ROUNDS = 60
+
 # The header's parts, each an eighth of its width, so that reading one needs no width.
 HEADER_PARTS = 8
 STAMP = 1.0
@@ -44,8 +49,6 @@ STAMP = 1.0
 # Shorter vectors than this are not directions: rays that could not be resolved, whose vectors are 0. Between places
 # whose light comes from opposite directions, beside the flat side of a fast hole, interpolation shortens vectors too.
 SHORTEST = 1e-3
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,27 @@ def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, Wor
     counts = {"rays": len(looking), "unresolved": int(np.count_nonzero(fate == Fate.UNRESOLVED))}
     metadata = {"hash": parameters.hash, "counts": counts, "parameters": parameters.to_metadata()}
     return WorldMap(texture, metadata)
+
+
+def distances(s: Array) -> Array:
+    """Return the distances from the shadow's edge at given values of the map's second coordinate.
+
+    Solves ln(delta) + delta = s by Newton's method in ln(delta), which comes down from above.
+
+    Parameters
+    ----------
+    s : ndarray
+
+    Returns
+    -------
+    ndarray
+        delta, radians, > 0; the shape of `s`.
+    """
+    logarithm = s.astype(np.float64)
+    for _ in range(NEWTON_ROUNDS):
+        delta = np.exp(logarithm)
+        logarithm -= (logarithm + delta - s) / (1.0 + delta)
+    return np.exp(logarithm)
 
 
 def _header(parameters: WarpMapParameters, observer: Observer, heights: Array) -> Image:

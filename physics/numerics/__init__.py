@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays, checks of input, errors, the sphere, Runge-Kutta integration and elliptic functions.
+"""Arrays and blocks, long work, checks of input, errors, angles, the sphere, Runge-Kutta, elliptic functions.
 
 Imports no other room.
 """

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from .arrays import Array, Mask
 
 # The step controller's usual constants (Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I,
 # section II.4): aim a little below the tolerance, never change the step by more than these factors.

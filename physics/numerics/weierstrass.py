@@ -20,11 +20,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kerr.rays import Array
-
-Index = NDArray[np.intp]
+from .arrays import Array, Index
 
 # Terms of the Laurent series behind the pole, and the longest time they are used for, in units of what makes the first
 # two of them 1: the next is below 1e-10 of the pole then, which is a relative error of time of half of that. Each

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..disk_passes.disk_pass import DiskPass
-from ..kerr.rays import Array
 from ..light.disk_look import DiskLook, shade
+from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..shot.disk import Disk
 from .reference_render import resize

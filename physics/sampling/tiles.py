@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array, Mask
 
 # Sides of the tiles in pixels, each half of the one before; the pixels of the last are traced one by one.
 TILE_SIDES = (256, 128, 64, 32, 16)
@@ -93,6 +93,25 @@ def tiles_of(width: int, height: int, side: int) -> Tiles:
     """Return the tiles of one size that cover a picture."""
     row, column = np.mgrid[0:height:side, 0:width:side]
     return Tiles(side, column.ravel(), row.ravel())
+
+
+def pool(mask: Mask, cells: int) -> Mask:
+    """Return whether any member of each square of `cells` x `cells` members is set.
+
+    Parameters
+    ----------
+    mask : ndarray of bool, shape (rows, columns)
+    cells : int
+
+    Returns
+    -------
+    ndarray of bool, shape (ceil(rows / cells), ceil(columns / cells))
+    """
+    rows, columns = (-(-size // cells) for size in mask.shape)
+    padded = np.zeros((rows * cells, columns * cells), dtype=bool)
+    padded[: mask.shape[0], : mask.shape[1]] = mask
+    pooled: Mask = padded.reshape(rows, cells, columns, cells).any(axis=(1, 3))
+    return pooled
 
 
 @cache

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ..geodesics.crossings import Crossings, LightAtDisk
 from ..geodesics.disk_tracer import disk_crossings
-from ..geodesics.tracer import BLOCK_SIZE
 from ..kerr.critical_curve import all_around, around_hole, edge_angles, edge_function
 from ..kerr.metric import metric_functions
 from ..kerr.observer import Observer
-from ..kerr.rays import Array, Rays, camera_triad, light_in_fido_frame, rays_from_axes, redshift_vector
+from ..kerr.rays import Rays, camera_triad, light_in_fido_frame, rays_from_axes, redshift_vector
+from ..numerics.arrays import Array
+from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.sphere import spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters

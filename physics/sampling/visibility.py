@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much of each pixel sees the sky: the shadow's edge, anti-aliased from its closed form.
 
-`trapped.edge_function` is a smooth signed function of the ray that vanishes on the edge. Pixels whose corners all
-have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's center (a distant hole
+`critical_curve.edge_function` is a smooth signed function of the ray that vanishes on the edge. Pixels whose corners
+all have one sign are wholly sky or wholly shadow; those at the edge, and those around the hole's center (a distant hole
 is smaller than a pixel), are divided into cells, and the edge is followed from cell to cell as a chain of chords.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 
 # Cells along each side of a pixel at the edge. A chord across a cell cuts off 1/(8 n^2 R) of the pixel for an edge of
 # radius R pixels: 8e-4 for a shadow 20 pixels wide.

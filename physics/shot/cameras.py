@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kerr.rays import Array
+from ..numerics.arrays import Array
 from ..numerics.checks import number, shown, whole
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import by_component, cos_sin

@@ -20,6 +20,8 @@ DESCRIBING = {"description", "help", "name", "bl_description"}
 INTERNAL = {"AssertionError", "NotImplementedError"}
 # What these say is their result, not a fault; pages of their own explain it.
 REPORTS = {"accuracy_report.py"}
+# Runs on a farm without the add-on, and speaks to its log.
+FARM_SCRIPTS = {"umbra_farm.py"}
 LEAST_WORDS = 3
 # A function that returns so many words returns the beginning of a sentence, which another one ends.
 WORDS_OF_A_CLAUSE = 5
@@ -38,10 +40,10 @@ class Message:
 
 def messages() -> list[Message]:
     """The sentences of both packages."""
-    files = [*sorted((ROOT / "physics").glob("*.py")), *sorted((ROOT / "blender_addon").glob("*.py"))]
+    files = [*sorted((ROOT / "physics").rglob("*.py")), *sorted((ROOT / "blender_addon").rglob("*.py"))]
     found = []
     for file in files:
-        if file.name in REPORTS:
+        if file.name in REPORTS | FARM_SCRIPTS:
             continue
         tree = ast.parse(file.read_text(encoding="utf-8"))
         for node in _spoken(tree, speaks=False):

@@ -8,7 +8,7 @@ from pages import DOCS, ROOT
 
 from physics.__main__ import _parser
 
-ADDON = sorted((ROOT / "blender_addon").glob("*.py"))
+ADDON = sorted((ROOT / "blender_addon").rglob("*.py"))
 MANUAL = "\n".join(page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md")))
 
 

@@ -28,9 +28,9 @@ from physics import (
 from physics.accuracy_check.accuracy import VISIBILITY_TOLERANCE, check_accuracy
 from physics.accuracy_check.accuracy_samples import choose
 from physics.files.exit_map_file import write_exit_map
-from physics.geodesics.tracer import drain
 from physics.maps.exit_map import bake_exit_map
 from physics.numerics.sphere import spherical_triad, unit_vectors
+from physics.numerics.work import drain
 
 ROOT = Path(__file__).parents[2]
 

@@ -41,7 +41,7 @@ def test_impact_vectors_keep_the_constants_of_motion(spin, observer, method):
     n, d = direction[sky], impact[sky]
     np.testing.assert_allclose((n * d).sum(axis=1), 0.0, atol=1e-7)
     # relative to the largest impact parameter: steps lose a little more than quadrature
-    size = rays.carter[sky] + (spin * n[:, 2]) ** 2
+    size = rays.q_plus_b2[sky] + (spin * n[:, 2]) ** 2
     np.testing.assert_allclose((d * d).sum(axis=1), size, rtol=1e-7, atol=1e-6)
     np.testing.assert_allclose(np.abs(np.cross(d, n)[:, 2]), np.abs(rays.b[sky]), rtol=1e-7, atol=1e-6)
 

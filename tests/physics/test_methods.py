@@ -84,7 +84,7 @@ def test_polar_motion_is_a_great_circle_without_spin():
     observer = Observer.fido(10.0, 1.0, 0.4)
     directions = camera_directions(*random_sky(200))
     rays = rays_from_camera(0.0, observer, directions)
-    time = 2.0 / np.sqrt(rays.carter)
+    time = 2.0 / np.sqrt(rays.q_plus_b2)
     end = PolarMotion.of(rays).direction(time, np.zeros(200), 1e-12).T
     start = unit_vectors(np.array(1.0), np.array(0.4))
     # Mino time times the angular momentum is the angle.
@@ -101,12 +101,12 @@ def test_polar_motion_conserves_carters_constant(theta):
     assert usable.sum() > 200
     rays = rays.select(usable)
     motion = PolarMotion.of(rays)
-    time, step = 1.5 / np.sqrt(rays.carter), 1e-5 / np.sqrt(rays.carter)
+    time, step = 1.5 / np.sqrt(rays.q_plus_b2), 1e-5 / np.sqrt(rays.q_plus_b2)
     still = np.zeros(len(rays))
     before, here, after = (motion.direction(time + shift, still, 1e-13) for shift in (-step, 0.0 * step, step))
     speed = (after - before) / (2.0 * step)
-    expected = rays.carter + spin**2 * here[2] ** 2
+    expected = rays.q_plus_b2 + spin**2 * here[2] ** 2
     # Central differences: the square of the step and rounding over the step, 1e-10 each.
     assert (speed**2).sum(axis=0) == pytest.approx(expected, rel=1e-8)
     turning = here[0] * speed[1] - here[1] * speed[0]
-    assert turning == pytest.approx(-rays.b, abs=1e-8 * np.sqrt(rays.carter).max())
+    assert turning == pytest.approx(-rays.b, abs=1e-8 * np.sqrt(rays.q_plus_b2).max())

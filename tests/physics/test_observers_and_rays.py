@@ -9,7 +9,7 @@ from references import angle_between, random_sky, unit_vectors
 
 from physics import BlackHoleError, Fate, Observer, UnstableOrbitWarning, trace_rays
 from physics.kerr.metric import ergosphere_radius, horizon_radius, metric_functions
-from physics.kerr.rays import camera_directions, camera_triad, rays_from_camera
+from physics.kerr.rays import camera_directions, camera_triad, light_in_fido_frame, rays_from_camera, rays_from_triad
 
 PLACES = [(0.9, 5.0, 1.0), (0.998, 1.5, 0.3), (0.0, 3.0, 2.0), (-0.5, 20.0, 1.5)]
 
@@ -188,3 +188,15 @@ def test_inside_everything():
     result = trace_rays(spin, Observer.fido(horizon_radius(spin) * 1.01, 1.0, 0.0), *random_sky(5000))
     assert result.counts["unresolved"] == 0
     assert 0 < result.counts["sky"] < 0.2 * 5000
+
+
+def test_observers_at_one_place_see_one_sky():
+    """The FIDO and a moving camera look at the same light in different directions (Eq. 5)."""
+    fido = Observer.fido(8.0, 1.1, 0.0)
+    moving = Observer(8.0, 1.1, 0.0, 0.7, (0.6, 0.0, 0.8))
+    looking = unit_vectors(np.linspace(0.1, 3.0, 50), np.linspace(0.0, 6.0, 50))
+    light, _ = light_in_fido_frame(moving, looking, np.eye(3))
+    at_rest = rays_from_triad(0.8, fido, -light.T)
+    in_motion = rays_from_triad(0.8, moving, looking)
+    assert at_rest.b == pytest.approx(in_motion.b, rel=1e-12)
+    assert at_rest.q == pytest.approx(in_motion.q, rel=1e-11)

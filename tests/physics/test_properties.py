@@ -360,7 +360,7 @@ def test_constants_of_motion_are_those_of_the_momentum(data, spin):
     cosine = math.cos(observer.theta)
     if math.sin(observer.theta) > 1e-3:
         theta_potential = rays.q + cosine**2 * (a * a - rays.b**2 / math.sin(observer.theta) ** 2)
-        scale = 1.0 + np.abs(rays.carter) + rays.b**2 / math.sin(observer.theta) ** 2
+        scale = 1.0 + np.abs(rays.q_plus_b2) + rays.b**2 / math.sin(observer.theta) ** 2
         assert np.abs(theta_potential - rays.polar**2).max(initial=0.0) < 1e-9 * scale.max(initial=1.0)
     delta = (r - horizon_radius(a)) * (r - a * a / horizon_radius(a))
     big = r * r + a * a - a * rays.b

@@ -8,7 +8,7 @@ import pytest
 from references import PUBLISHED, angle_between, bisect, unit_vectors
 
 from physics import Fate, Observer, trace_rays
-from physics.kerr.critical_curve import trapped_carter_constant, trapped_impact_parameters, trapped_orbit
+from physics.kerr.critical_curve import critical_carter_constant, critical_impact_parameters, spherical_orbit
 from physics.kerr.metric import horizon_radius, isco_radius, photon_orbit_radius
 
 EQUATOR = math.pi / 2
@@ -91,10 +91,10 @@ def test_photon_orbits_isco_and_ends_of_the_critical_curve(row):
     assert photon_orbit_radius(spin, True) == pytest.approx(r1, rel=1e-13)
     assert photon_orbit_radius(spin, False) == pytest.approx(r2, rel=1e-13)
     assert isco_radius(spin) == pytest.approx(isco, rel=1e-12)
-    low, high = trapped_impact_parameters(spin)
+    low, high = critical_impact_parameters(spin)
     assert (-high, -low) == pytest.approx((alpha_min, alpha_max), rel=1e-13)
     # Light without angular momentum about the axis: b = 0 at the polar orbit, and q + a^2 the circle's radius squared.
-    b0, q0 = trapped_orbit(spin, r_polar)
+    b0, q0 = spherical_orbit(spin, r_polar)
     assert b0 == pytest.approx(0.0, abs=1e-11)
     assert math.sqrt(q0 + spin**2) == pytest.approx(on_axis, rel=1e-12)
 
@@ -107,8 +107,8 @@ def test_horizon():
 @pytest.mark.parametrize(("spin", "_radius", "alpha", "beta"), PUBLISHED["kerr_curve_eq"])
 def test_points_of_the_critical_curve(spin, _radius, alpha, beta):
     """Bardeen's alpha = -b, beta^2 = q for an observer in the equatorial plane."""
-    low, high = trapped_impact_parameters(float(spin))
-    q = trapped_carter_constant(float(spin), np.clip(-alpha, low, high))
+    low, high = critical_impact_parameters(float(spin))
+    q = critical_carter_constant(float(spin), np.clip(-alpha, low, high))
     # beta vanishes at the ends like a square root: beta^2 is the well-conditioned quantity.
     assert q == pytest.approx(beta**2, abs=1e-11, rel=1e-11)
 
@@ -140,7 +140,7 @@ def test_redshift_on_a_circular_orbit():
     the prograde edge, whose b is known in closed form."""
     spin, radius = 0.999, 6.03
     observer = Observer.circular_orbit(spin, radius)
-    b = trapped_impact_parameters(spin)[1]
+    b = critical_impact_parameters(spin)[1]
     root = radius**1.5
     expected = math.sqrt(1.0 - 3.0 / radius + 2.0 * spin / root) / ((1.0 + spin / root) * (1.0 - b / (spin + root)))
     # The edge itself is shadow; a step of 1e-10 rad outside changes 1 + z by as little.

@@ -16,8 +16,8 @@ from physics.geodesics.crossings import cross_plane
 from physics.geodesics.mino import radial_polynomial
 from physics.geodesics.polar import PolarMotion
 from physics.geodesics.radial_path import winding
+from physics.kerr.critical_curve import position_angles
 from physics.kerr.rays import rays_from_triad
-from physics.maps.sky_table import position_angles
 from physics.numerics.sphere import unit_vectors
 from physics.sampling.view import View
 

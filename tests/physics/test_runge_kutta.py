@@ -164,7 +164,7 @@ def test_shapes_blocks_progress_and_cancelling(monkeypatch):
     assert trace_rays(0.5, observer, 1.0, 2.0).theta.shape == ()
     assert trace_rays(0.5, observer, [], []).theta.shape == (0,)
 
-    monkeypatch.setattr(tracer, "BLOCK_SIZE", 7)
+    monkeypatch.setattr("physics.numerics.blocks.BLOCK_SIZE", 7)
     fractions = []
     blocked = trace_rays(0.5, observer, theta_rd, phi_rd, progress=fractions.append)
     assert np.array_equal(blocked.theta, whole.theta.ravel(), equal_nan=True)

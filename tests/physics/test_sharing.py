@@ -9,7 +9,8 @@ import pytest
 from references import about, angle_between, unit_vectors
 from shots import shot
 
-from physics import PerspectiveCamera, bake, turned_map
+from physics import MapBaker, PerspectiveCamera, bake, turned_map
+from physics.numerics.work import drain
 
 
 def orbiting(parameters, angle, **changes):
@@ -95,3 +96,30 @@ def test_exact_maps_are_shared_only_with_exactly_the_same_sky():
     assert turned_map(earlier, orbiting(exact, 0.5)) is None  # the rotation itself rounds
     tilted = dataclasses.replace(exact, hole_to_world=about(0, 0.5).tolist())
     assert turned_map(earlier, tilted) is not None
+
+
+def test_other_places_and_other_directions_share_nothing():
+    moving = [dataclasses.replace(BASE, camera_position=(12.0 + 1e-3 * k, 0.0, 1.0)) for k in range(3)]
+    panning = [
+        dataclasses.replace(BASE, camera_to_hole=(np.array(BASE.camera_to_hole) @ about(1, 0.1 * k)).tolist())
+        for k in range(2)
+    ]
+    exact = [dataclasses.replace(parameters, interpolation=0.0) for parameters in panning]
+    for frames in (moving, panning, exact):
+        baker = MapBaker()
+        for parameters in frames:
+            shared, alone = drain(baker.steps(parameters)), bake(parameters)
+            assert np.array_equal(shared.theta, alone.theta)
+            assert np.array_equal(shared.phi, alone.phi)
+            assert shared.counts == alone.counts
+
+
+def test_a_baker_turns_the_map_that_was_traced():
+    baker = MapBaker()
+    traced = drain(baker.steps(BASE))
+    for angle in (0.3, 1.0):
+        turned, expected = drain(baker.steps(orbiting(BASE, angle))), turned_map(traced, orbiting(BASE, angle))
+        assert np.array_equal(turned.theta, expected.theta)
+        assert np.array_equal(turned.phi, expected.phi)
+        assert turned.counts["rays"] == 0
+        assert turned.counts["shared"] == traced.counts["rays"]

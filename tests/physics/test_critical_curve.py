@@ -10,12 +10,12 @@ from references import random_sky
 from physics import BlackHoleError, Observer
 from physics.kerr.critical_curve import (
     comes_from_sky,
+    critical_carter_constant,
+    critical_impact_parameters,
     edge_angles,
     edge_function,
-    trapped_carter_constant,
-    trapped_impact_parameters,
-    trapped_orbit,
-    trapped_radii,
+    spherical_orbit,
+    spherical_orbit_radii,
 )
 from physics.kerr.metric import horizon_radius
 from physics.kerr.rays import camera_directions, rays_from_camera
@@ -67,10 +67,10 @@ def test_closed_form_agrees_with_the_flowchart(spin, observer):
     """Eqs. 11 and 12: rays within the range of b and below q0(b) have no turning point, p_r decides; the others
     come from the sky exactly if the camera is outside the largest root of R."""
     rays = rays_of(spin, observer)
-    low, high = trapped_impact_parameters(spin)
+    low, high = critical_impact_parameters(spin)
     inside = (rays.b > low) & (rays.b < high)
     free = np.zeros(len(rays), dtype=bool)
-    free[inside] = rays.q[inside] < trapped_carter_constant(spin, rays.b[inside])
+    free[inside] = rays.q[inside] < critical_carter_constant(spin, rays.b[inside])
     expected = np.zeros(len(rays), dtype=bool)
     for i in np.flatnonzero(rays.escapes):
         if free[i]:
@@ -115,27 +115,27 @@ def test_edge_function_is_smooth_across_the_edge():
 
 
 @pytest.mark.parametrize("spin", [0.01, 0.5, 0.9, 0.9999, -0.6])
-def test_trapped_orbits_round_trip(spin):
+def test_spherical_orbits_round_trip(spin):
     """q0 through the cubic for r0 equals Eq. 9 evaluated at r0, and the ends of b are those of Eqs. 9, 10."""
-    prograde, retrograde = trapped_radii(spin)
-    low, high = trapped_impact_parameters(spin)
-    ends, _ = trapped_orbit(spin, [retrograde, prograde])
+    prograde, retrograde = spherical_orbit_radii(spin)
+    low, high = critical_impact_parameters(spin)
+    ends, _ = spherical_orbit(spin, [retrograde, prograde])
     # Eq. 9 divides by the spin: 1e-15 / a.
     assert ends == pytest.approx([low, high], abs=1e-11 / abs(spin))
     radius = np.linspace(prograde, retrograde, 50)[1:-1]
-    b, q = trapped_orbit(spin, radius)
-    assert trapped_carter_constant(spin, b) == pytest.approx(q, rel=1e-9, abs=1e-11 / spin**2)
+    b, q = spherical_orbit(spin, radius)
+    assert critical_carter_constant(spin, b) == pytest.approx(q, rel=1e-9, abs=1e-11 / spin**2)
 
 
-def test_trapped_orbits_without_spin():
-    low, high = trapped_impact_parameters(0.0)
+def test_spherical_orbits_without_spin():
+    low, high = critical_impact_parameters(0.0)
     assert (low, high) == pytest.approx((-math.sqrt(27.0), math.sqrt(27.0)))
     b = np.linspace(-5.0, 5.0, 11)
-    assert trapped_carter_constant(0.0, b) == pytest.approx(27.0 - b**2, rel=1e-13)
+    assert critical_carter_constant(0.0, b) == pytest.approx(27.0 - b**2, rel=1e-13)
     with pytest.raises(BlackHoleError, match="without spin"):
-        trapped_orbit(0.0, 3.0)
+        spherical_orbit(0.0, 3.0)
     with pytest.raises(BlackHoleError, match="between"):
-        trapped_carter_constant(0.5, 9.0)
+        critical_carter_constant(0.5, 9.0)
 
 
 def test_rays_of_negative_energy_are_shadow():
