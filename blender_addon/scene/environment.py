@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
+from ..core.blender_version import NODES_ARE_OPTIONAL
 from ..core.errors import SceneError
 from ..core.physics_api import PACKAGE, exr, star_sky
 
@@ -94,7 +95,7 @@ def read_world(scene: bpy.types.Scene) -> Sky:
     world = scene.get(WORLD_BEFORE, scene.world)
     if world is None:
         raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
-    uses_nodes = bpy.app.version >= (5, 0) or world.use_nodes
+    uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
     if not uses_nodes or world.node_tree is None:
         raise SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.')
     engine = "CYCLES" if scene.render.engine == "CYCLES" else "EEVEE"

@@ -7,15 +7,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.blender_version import OSL_COUNTS_ROWS_UPWARDS
 from ...core.errors import SceneError
 from ...core.physics_api import lens, physics
 from ...scene import frame_setup
 from ...scene.camera_type import is_converted
 from ...settings.scene_properties import EXIT_MAP
 from . import lens_camera, lens_shader
-
-# The first version whose Cycles counts a texture's rows from the bottom.
-UPWARDS_SINCE = (5, 2, 0)
 
 # A camera that bends its rays can render a part of the picture.
 TRAITS = frame_setup.Traits(crops=True)
@@ -54,7 +52,7 @@ def values_of(scene: bpy.types.Scene, frame: frame_setup.FrameSetup, map_path: P
     if map_path is not None:
         width, height = frame.parameters.map_size
         values |= {"exit_map": str(map_path), "map_size": (float(width), float(height), 0.0)}
-        values["map_upwards"] = int(bpy.app.version >= UPWARDS_SINCE)
+        values["map_upwards"] = int(OSL_COUNTS_ROWS_UPWARDS)
     return values
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...core.blender_version import SCENE_OWNS_COMPOSITOR
 from ...core.errors import SceneError
 
 # The node's custom property that says what it is for, and its values.
@@ -26,7 +27,7 @@ class Setup:
 
 def has_scene_tree() -> bool:
     """Whether this Blender keeps the compositor's tree inside the scene (before 5.0)."""
-    return bpy.app.version < (5, 0)
+    return SCENE_OWNS_COMPOSITOR
 
 
 def find_tree(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:

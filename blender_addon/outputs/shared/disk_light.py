@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.physics_api import disk_look, physics
 from ...nodes import disk_images
 from ...scene import disk_animation
@@ -131,7 +132,7 @@ def _add(scene: bpy.types.Scene, hole: bpy.types.Object) -> bpy.types.Object:
 def _material() -> bpy.types.Material:
     """Emission by the vertices' light; camera rays pass, in engines that know no ray visibility too."""
     material = bpy.data.materials.new(NAME)
-    if bpy.app.version < (5, 0, 0):
+    if NODES_ARE_OPTIONAL:
         material.use_nodes = True  # always so from 5.0 on, where setting it is deprecated
     tree = material.node_tree
     tree.nodes.clear()

@@ -8,6 +8,7 @@ Tint and Fault.
 
 import bpy
 
+from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
 from ...scene import environment
@@ -62,7 +63,7 @@ def check(scene: bpy.types.Scene) -> None:
     world = scene.world
     if world is None:
         raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
-    uses_nodes = bpy.app.version >= (5, 0) or world.use_nodes
+    uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
     if uses_nodes and not any(node.type == "BACKGROUND" for node in world.node_tree.nodes):
         raise SceneError(_NO_BACKGROUND.format(world.name))
 
@@ -159,7 +160,7 @@ def _copy_of_world(scene: bpy.types.Scene) -> bpy.types.World:
         raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
     made = world.copy()
     made.name = f"{world.name} (lensed)"
-    if bpy.app.version < (5, 0) and not made.use_nodes:
+    if NODES_ARE_OPTIONAL and not made.use_nodes:
         made.use_nodes = True
         made.node_tree.nodes.clear()
         background = made.node_tree.nodes.new("ShaderNodeBackground")
@@ -173,7 +174,7 @@ def _world_of_image(scene: bpy.types.Scene) -> bpy.types.World:
     """A World that shows the image chosen as the sky."""
     sky = environment.read(scene)
     made = bpy.data.worlds.new(f"{sky.image.name} (lensed)")
-    if bpy.app.version < (5, 0):
+    if NODES_ARE_OPTIONAL:
         made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What differs between the supported versions of Blender. Nothing else asks for the version."""
+
+import bpy
+
+# Before 5.0 the compositor's tree is part of the scene and ends in a Composite node; since then it is a node group.
+SCENE_OWNS_COMPOSITOR = bpy.app.version < (5, 0)
+# Before 5.0 Worlds and materials have a switch for their nodes; since then they always use them.
+NODES_ARE_OPTIONAL = bpy.app.version < (5, 0)
+# Since 5.0 interpolation and extension of Map UV are sockets.
+MAP_UV_HAS_MENUS = bpy.app.version >= (5, 0)
+# Since 5.2 Cycles counts the rows of a texture in OSL from the bottom.
+OSL_COUNTS_ROWS_UPWARDS = bpy.app.version >= (5, 2)
+
+# Node groups are built for one version, which this text names.
+SERIES = f"{bpy.app.version[0]}.{bpy.app.version[1]}"
