@@ -13,7 +13,7 @@ environment = interpreter=$$(.ci/find_python "$(PYTHON)") && python=$$("$$interp
 help:
 	@echo "make demo       render the demo scenes to $(DEMO_FOLDER)"
 	@echo "make test       run the tests"
-	@echo "make lint       style, types, and the rule that physics knows nothing of Blender"
+	@echo "make lint       style, format, types, and which room may import which"
 	@echo "make extension  build the extension for Blender into build/"
 	@echo "make manual     build the manual into build/manual; open its index.html"
 	@echo "make benchmark  measure tracing, maps, files and animations (a table and plots in build/benchmark)"
@@ -30,7 +30,7 @@ test:
 	@$(environment) && "$$python" -m pytest $(PYTEST_ARGUMENTS)
 
 lint:
-	@$(environment) && bin=$$(dirname "$$python") && "$$bin/ruff" check . && "$$bin/mypy" && "$$bin/lint-imports"
+	@$(environment) && bin=$$(dirname "$$python") && "$$bin/ruff" check . && "$$bin/ruff" format --check . && "$$bin/mypy" && "$$bin/lint-imports"
 
 extension:
 	@$(environment) && "$$python" .ci/build_extension.py && "$$python" .ci/build_extension.py --split-platforms
