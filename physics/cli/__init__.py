@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands of `python -m physics`, one module per command.
+"""The command line `python -m physics`, one module per command; `main.COMMANDS` lists them.
 
-Imports every room below.
+Imports every room below. Hands on `main`.
 """
+
+from .main import main, make_parser
+
+__all__ = ["main", "make_parser"]

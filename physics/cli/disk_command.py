@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disk on the command line: options of ``bake`` and ``render``, and where the passes are."""
+"""The disk on the command line: options of ``bake`` and ``render``."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-from pathlib import Path
 
-from ..disk_passes.disk_pass import DiskPass
-from ..files.disk_pass_file import read_disk_pass, write_disk_pass
+from ..files.disk_pass_file import read_disk_passes
 from ..geodesics.disk_tracer import DEFAULT_CROSSINGS
 from ..light.disk_look import PRESETS
 from ..light.disk_texture import disk_texture
 from ..maps.warp_map import WarpMap
 from ..numerics.arrays import Array
-from ..numerics.errors import BlackHoleError, WarpMapError
+from ..numerics.errors import BlackHoleError
 from ..reference.disk_render import disk_layers, over_sky
 from ..shot.disk import DEFAULT_OUTER_RADIUS, Disk
 
@@ -61,52 +59,9 @@ def disk_of(options: argparse.Namespace) -> Disk | None:
     return Disk(**given) if options.disk else None
 
 
-def pass_path(map_path: Path, crossing: int) -> Path:
-    """Return where the pass of a crossing, counted from 1, lies beside its map: MAP_disk1.exr and so on."""
-    return map_path.with_name(f"{map_path.stem}_disk{crossing}{map_path.suffix}")
-
-
-def write_passes(map_path: Path, warp_map: WarpMap) -> list[Path]:
-    """Write a map's passes beside it and return where.
-
-    Raises
-    ------
-    ImageFileError
-        When a file cannot be written.
-    """
-    paths = []
-    for one in warp_map.disk_passes:
-        paths.append(pass_path(map_path, one.metadata["crossing"]))
-        write_disk_pass(paths[-1], one)
-    return paths
-
-
-def read_passes(map_path: Path, warp_map: WarpMap) -> list[DiskPass]:
-    """Read the passes that were baked along with a map.
-
-    Raises
-    ------
-    BlackHoleError
-        When the map was baked without a disk.
-    WarpMapError
-        When a pass is missing or damaged, or belongs to another map.
-    """
-    disk = warp_map.metadata["parameters"].get("disk")
-    if not disk:
-        raise BlackHoleError(f"{map_path} was baked without a disk; bake it again with --disk.")
-    passes = []
-    for crossing in range(1, disk["crossings"] + 1):
-        path = pass_path(map_path, crossing)
-        one = read_disk_pass(path)
-        if one.metadata["hash"] != warp_map.metadata["hash"] or one.metadata["crossing"] != crossing:
-            raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.")
-        passes.append(one)
-    return passes
-
-
 def draw_disk(options: argparse.Namespace, warp_map: WarpMap, sky: Array) -> Array:
     """Return the picture, shape (height, width, 4), of the disk that the options of ``render`` ask for over a sky."""
     look = PRESETS[options.disk_look]
     look = dataclasses.replace(look, exposure=look.exposure + options.disk_exposure)
-    layers = disk_layers(read_passes(options.map, warp_map), look, disk_texture(), options.disk_time)
+    layers = disk_layers(read_disk_passes(options.map, warp_map), look, disk_texture(), options.disk_time)
     return over_sky(sky, *layers)

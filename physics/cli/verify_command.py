@@ -13,13 +13,16 @@ from ..files.map_file import ATTRIBUTE_FORMAT
 from ..images.exr import read_exr_header, target_of
 from ..numerics.errors import BlackHoleError, ImageFileError
 
+NAME = "verify"
+HELP = "read maps and disk passes completely, and say which are valid"
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("paths", metavar="MAP.exr|FOLDER", type=Path, nargs="+")
 
 
-def verify(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Check the files, print a line for each that does not hold, and the counts.
 
     Raises

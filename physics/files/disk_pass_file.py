@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import math
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
 from ..disk_passes.disk_pass import DiskPass
 from ..images.exr import PathLike
-from ..numerics.errors import WarpMapError
+from ..maps.warp_map import WarpMap
+from ..numerics.errors import BlackHoleError, WarpMapError
 from .map_file import MapFormat, advice
 
 FORMAT = MapFormat(
@@ -19,6 +24,114 @@ FORMAT = MapFormat(
     "R: radius on the disk (M); G: azimuth in the hole's frame (radians); B: g; A: coverage",
     attributes=("umbraCrossing",),
 )
+
+
+# The number of the frame at the end of a map's name.
+_FRAME = re.compile(r"_\d+$")
+
+
+def pass_path(map_path: PathLike, crossing: int) -> str:
+    """Return where a disk's pass lies: beside its map, with _disk1 in its name for the first crossing.
+
+    Parameters
+    ----------
+    map_path : path
+        The map's; also one that only Blender understands, such as ``//maps/Scene_0001.exr``.
+    crossing : int
+        1 for the direct image.
+
+    Returns
+    -------
+    str
+        ``Scene_disk1_0001.exr`` for ``Scene_0001.exr``, so that the passes of an animation are an image sequence too;
+        ``picture_disk1.exr`` for ``picture.exr``, which has no frame number.
+    """
+    stem, ending = os.path.splitext(os.fspath(map_path))
+    frame = _FRAME.search(stem)
+    end = len(stem) if frame is None else frame.start()
+    return f"{stem[:end]}_disk{crossing}{stem[end:]}{ending}"
+
+
+def find_pass(map_path: PathLike, crossing: int) -> Path:
+    """Return where a disk's pass is to be read from.
+
+    Parameters
+    ----------
+    map_path : path
+    crossing : int
+        1 for the direct image.
+
+    Returns
+    -------
+    Path
+        That of `pass_path`, unless only a file named ``Scene_0001_disk1.exr`` is there, the older rule of
+        ``python -m physics bake``.
+    """
+    path, map_path = Path(pass_path(map_path, crossing)), Path(map_path)
+    former = map_path.with_name(f"{map_path.stem}_disk{crossing}{map_path.suffix}")
+    return former if former.is_file() and not path.is_file() else path
+
+
+def write_disk_passes(map_path: PathLike, passes: Iterable[DiskPass]) -> list[Path]:
+    """Write the passes of a map's disk beside the map.
+
+    Parameters
+    ----------
+    map_path : path
+        The map's.
+    passes : iterable of DiskPass
+        `WarpMap.disk_passes`.
+
+    Returns
+    -------
+    list of Path
+        Where the passes lie, in their order.
+
+    Raises
+    ------
+    ImageFileError
+        If a file cannot be written.
+    """
+    paths = []
+    for one in passes:
+        paths.append(Path(pass_path(map_path, one.metadata["crossing"])))
+        write_disk_pass(paths[-1], one)
+    return paths
+
+
+def read_disk_passes(map_path: PathLike, warp_map: WarpMap) -> list[DiskPass]:
+    """Read the passes that were baked along with a map.
+
+    Parameters
+    ----------
+    map_path : path
+        Where the map lies.
+    warp_map : WarpMap
+        The map.
+
+    Returns
+    -------
+    list of DiskPass
+        The first crossing first.
+
+    Raises
+    ------
+    BlackHoleError
+        If the map was baked without a disk.
+    WarpMapError
+        If a pass is missing or damaged, or belongs to another map.
+    """
+    disk = warp_map.metadata["parameters"].get("disk")
+    if not disk:
+        raise BlackHoleError(f"{map_path} was baked without a disk; bake it again with --disk.")
+    passes = []
+    for crossing in range(1, disk["crossings"] + 1):
+        path = find_pass(map_path, crossing)
+        one = read_disk_pass(path)
+        if one.metadata["hash"] != warp_map.metadata["hash"] or one.metadata["crossing"] != crossing:
+            raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.")
+        passes.append(one)
+    return passes
 
 
 def write_disk_pass(path: PathLike, disk_pass: DiskPass) -> None:

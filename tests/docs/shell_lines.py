@@ -12,7 +12,7 @@ from typing import Protocol
 
 from pages import ROOT
 
-from physics.__main__ import main
+from physics.cli import main
 
 # Blender's options with the number of values each takes, from `blender --help` of 4.5 and 5.2.
 BLENDER_OPTIONS = {

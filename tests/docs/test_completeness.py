@@ -6,18 +6,18 @@ import ast
 
 from pages import DOCS, ROOT
 
-from physics.__main__ import _parser
+from physics.cli import make_parser
 
 ADDON = sorted((ROOT / "blender_addon").rglob("*.py"))
 MANUAL = "\n".join(page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md")))
 
 
 def command_line_options():
-    (commands,) = [each for each in _parser()._actions if isinstance(each, argparse._SubParsersAction)]
+    (commands,) = [each for each in make_parser()._actions if isinstance(each, argparse._SubParsersAction)]
     for command, parser in commands.choices.items():
         yield command, f"python -m physics {command}"
         for action in parser._actions:
-            if action.option_strings and action.dest != "help":
+            if action.option_strings and action.dest != "help" and action.help != argparse.SUPPRESS:
                 yield command, f"`{action.option_strings[-1]}"
 
 

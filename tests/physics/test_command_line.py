@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line as a user meets it: a process of its own, its exit status and its words."""
 
+import json
 import subprocess
 import sys
 import zlib
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from physics import read_warp_map
+from physics.files.disk_pass_file import pass_path
 from physics.images.exr import read_exr, write_exr
 from physics.images.png import srgb_from_linear
 
@@ -183,3 +185,44 @@ def test_impossible_disks_are_refused_in_one_sentence(tmp_path, arguments, words
 def test_a_map_without_a_disk_has_none_to_draw(baked, sky, tmp_path):
     result = run("render", baked, sky, tmp_path / "picture.png", "--disk")
     assert (result.returncode, "baked without a disk" in result.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("map_path", "expected"),
+    [
+        ("map.exr", "map_disk2.exr"),
+        ("Scene_Black_Hole_48x27_0001.exr", "Scene_Black_Hole_48x27_disk2_0001.exr"),
+        ("//umbra_maps/Scene_Black_Hole_48x27_999995.exr", "//umbra_maps/Scene_Black_Hole_48x27_disk2_999995.exr"),
+        ("shot_1/map.exr", "shot_1/map_disk2.exr"),
+        ("spin_0.9.exr", "spin_0.9_disk2.exr"),
+        ("a_1_b.exr", "a_1_b_disk2.exr"),
+    ],
+)
+def test_passes_are_named_by_one_rule(map_path, expected):
+    assert pass_path(map_path, 2) == expected
+
+
+@pytest.mark.parametrize("names", ["{stem}_disk{crossing}_{frame}.exr", "{stem}_{frame}_disk{crossing}.exr"])
+def test_a_disk_is_drawn_however_its_passes_are_named(tmp_path, sky, names):
+    """The passes of a numbered map, as the add-on names them, and as this command line once did."""
+    path, picture = tmp_path / "shot_0007.exr", tmp_path / "picture.exr"
+    small = ("--width", 64, "--height", 36, "--radius", 40, "--fov", 40)
+    assert run("bake", path, *small, "--disk", "--disk-crossings", 2).returncode == 0
+    for crossing in (1, 2):
+        name = names.format(stem="shot", frame="0007", crossing=crossing)
+        (tmp_path / f"shot_disk{crossing}_0007.exr").replace(tmp_path / name)
+    result = run("render", path, sky, picture, "--disk")
+    assert result.returncode == 0, result.stderr
+    assert picture.is_file()
+    result = run("accuracy", path, "--samples", 100, "--json")
+    assert result.returncode == 0, result.stderr
+    assert len(json.loads(result.stdout)["disk"]) == 2
+
+
+def test_the_british_spelling_of_an_option_is_accepted(baked, sky, tmp_path):
+    pictures = [tmp_path / "american.exr", tmp_path / "british.exr"]
+    for picture, option in zip(pictures, ("--redshift-color", "--redshift-colour"), strict=True):
+        result = run("render", baked, sky, picture, option, 0.25)
+        assert result.returncode == 0, result.stderr
+    assert np.array_equal(read_exr(pictures[0])[0], read_exr(pictures[1])[0])
+    assert "colour" not in run("render", "--help").stdout

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m physics bake``: trace a warp map."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from pathlib import Path
+
+from ..files.disk_pass_file import write_disk_passes
+from ..files.warp_map_file import write_warp_map
+from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
+from ..maps.warp_map import bake
+from ..numerics.errors import BlackHoleError
+from ..shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
+from ..shot.map_parameters import (
+    DEFAULT_INTERPOLATION,
+    MOTIONS,
+    SUPERSAMPLING,
+    WarpMapParameters,
+    looking_at_hole,
+    unstable_orbit_warning,
+)
+from . import disk_command
+from .progress import ProgressPrinter
+
+NAME = "bake"
+HELP = "trace a warp map of a camera that looks at the hole"
+
+# Motions as they are spelled on a command line; "velocity" has no short form there.
+ORBITS = {motion.replace("_", "-"): motion for motion in MOTIONS if motion != "velocity"}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("output", metavar="OUT.exr", type=Path)
+    parser.add_argument("--spin", type=float, default=0.9, help="spin of the hole, above -1 and below 1")
+    parser.add_argument("--radius", type=float, default=20.0, help="distance of the camera, in M")
+    parser.add_argument("--inclination", type=float, default=80.0, help="degrees from the spin axis, 0 to 180")
+    parser.add_argument("--azimuth", type=float, default=0.0, help="degrees about the spin axis")
+    parser.add_argument("--orbit", choices=tuple(ORBITS), default="fido", help="how the camera moves")
+    parser.add_argument("--width", type=int, default=1920, help="pixels of the picture")
+    parser.add_argument("--height", type=int, default=1080, help="pixels of the picture")
+    parser.add_argument("--fov", type=float, default=60.0, help="vertical field of view, degrees")
+    parser.add_argument("--panorama", action="store_true", help="the whole sky, equirectangular, instead of --fov")
+    parser.add_argument("--supersampling", type=int, choices=SUPERSAMPLING, default=1, help="map pixels per side")
+    parser.add_argument("--tolerance", type=float, default=DEFAULT_TOLERANCE, help="error of a ray, radians")
+    parser.add_argument(
+        "--interpolation",
+        type=float,
+        default=DEFAULT_INTERPOLATION,
+        help="error of direction between traced rays, radians; 0 traces every pixel",
+    )
+    parser.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
+    disk_command.add_bake_options(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Trace the map and write it, with its disk's passes.
+
+    Raises
+    ------
+    BlackHoleError
+        If no map can be made from the options, or a file cannot be written.
+    """
+    if options.output.suffix.lower() != ".exr":
+        raise BlackHoleError(f"{options.output} does not end in .exr; warp maps are OpenEXR files.")
+    if options.output.is_dir():
+        raise BlackHoleError(f"{options.output} is a folder; give the name of a file.")
+    if not 0.0 <= options.inclination <= 180.0:
+        raise BlackHoleError(f"The inclination is {options.inclination:g} degrees; give 0 to 180.")
+    camera: Camera
+    if options.panorama:
+        camera = PanoramaCamera(options.width, options.height)
+    else:
+        camera = PerspectiveCamera.from_field_of_view(options.width, options.height, math.radians(options.fov))
+    theta, phi = math.radians(options.inclination), math.radians(options.azimuth)
+    position = (
+        options.radius * math.sin(theta) * math.cos(phi),
+        options.radius * math.sin(theta) * math.sin(phi),
+        options.radius * math.cos(theta),
+    )
+    if not options.radius > 0.0:
+        raise BlackHoleError(f"The radius is {options.radius:g} M; it must be positive.")
+    parameters = WarpMapParameters(
+        spin=options.spin,
+        camera=camera,
+        camera_position=position,
+        camera_to_hole=looking_at_hole(position),
+        motion=ORBITS[options.orbit],
+        supersampling=options.supersampling,
+        tolerance=options.tolerance,
+        method=options.method,
+        interpolation=options.interpolation,
+        disk=disk_command.disk_of(options),
+    )
+    parameters.validate()
+    warning = unstable_orbit_warning(parameters)
+    if warning:
+        print(f"note: {warning}", file=sys.stderr)
+    started = time.perf_counter()
+    warp_map = bake(parameters, progress=ProgressPrinter())
+    passes = write_disk_passes(options.output, warp_map.disk_passes)
+    write_warp_map(options.output, warp_map)
+    counts = dict(warp_map.counts)
+    rays = counts.pop("rays") + counts.pop("shared") + counts.pop("disk_rays", 0)
+    lost = counts.pop("disk_unresolved", 0)
+    pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
+    print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels from {rays} rays")
+    unresolved = warp_map.counts["unresolved"]
+    for path in passes:
+        print(f"wrote {path}")
+    if lost:
+        print(f"note: the disk could not be resolved in {lost} pixels and is missing there", file=sys.stderr)
+    if unresolved:
+        print(f"note: {unresolved} pixels could not be resolved and will show magenta", file=sys.stderr)
