@@ -134,8 +134,8 @@ def test_turning_the_camera_traces_no_new_map(scene, preview, world_sync, monkey
 def test_handlers_only_note_and_many_changes_are_one_map(scene, preview, world_sync, monkeypatch) -> None:
     start(scene, preview)
     reads = []
-    read = preview.shot.read
-    monkeypatch.setattr(preview.shot, "read", lambda *given, **named: (reads.append(1), read(*given, **named))[1])
+    read = preview.frames.read
+    monkeypatch.setattr(preview.frames, "read", lambda *given, **named: (reads.append(1), read(*given, **named))[1])
     updates = preview.state(scene).updates
     for step in range(50):
         scene.camera.location.x = 0.1 * step
@@ -179,19 +179,16 @@ def test_a_hundred_changes_leave_no_images_behind(scene, preview, physics, engin
     assert [image.name for image in bpy.data.images if image.name.startswith("Umbra Live Map")] == []
 
 
-def test_switched_off_with_the_add_on_it_leaves_worlds_that_read_files(
-    scene, preview, world_sync, addon_module
-) -> None:
+def test_switched_off_with_the_add_on_it_leaves_worlds_that_read_files(scene, preview, world_sync) -> None:
     start(scene, preview)
     assert world_sync.shows_live(scene)
-    panel = addon_module("ui.preview_panel")
-    panel.unregister()
+    preview.unregister()
     try:
         assert not world_sync.shows_live(scene)
         assert [image.name for image in bpy.data.images if image.name.startswith("Umbra Live Map")] == []
         assert "world_" in bpy.path.basename(world_sync._file_image(scene).filepath)
     finally:
-        panel.register()
+        preview.register()
 
 
 def test_the_thumbnail_shows_what_the_camera_sees(scene, preview, thumbnail, physics, tmp_path) -> None:
@@ -313,7 +310,7 @@ def test_each_scene_has_a_preview_of_its_own(scene, preview, world_sync, tmp_pat
     assert np.array_equal(shown(scene, world_sync), first)
     bpy.data.scenes.remove(other)
     settle_after_change(scene, preview)
-    assert list(preview._states) == [scene.name]
+    assert [each.name for each, _state in preview._states.items()] == [scene.name]
 
 
 def test_switching_the_output_back_ends_the_preview_of_the_world(scene, preview, world_sync) -> None:

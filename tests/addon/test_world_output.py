@@ -415,7 +415,7 @@ def test_a_farm_looks_for_world_maps(scene: bpy.types.Scene, tmp_path: Path, phy
     assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
     blend = tmp_path / "world.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    script = Path(physics.__file__).parent / "farm" / "umbra_farm.py"
+    script = Path(physics.__file__).parents[1] / "farm" / "umbra_farm.py"
     check = f"""
 import importlib.util, pathlib
 spec = importlib.util.spec_from_file_location("umbra_farm", {str(script)!r})
