@@ -45,6 +45,13 @@ napoleon_use_ivar = True
 # Types are written for people ("float or ndarray, shape (n,)"): only names of this package are looked up.
 nitpick_ignore_regex = [(r"py:.*", r"(?!physics\.).*")]
 
+# Names of the API by where they are defined.
+PUBLIC_NAMES = {
+    f"{found.__module__}.{found.__qualname__}": name
+    for name in physics.__all__
+    if hasattr(found := getattr(physics, name), "__qualname__")
+}
+
 # Pages of the table of contents that are left out while they are not there.
 OPTIONAL = ("live_preview", "world", "long_shots", "farms", "accuracy")
 
@@ -100,13 +107,12 @@ def _read_page(_app: Sphinx, page: str, source: list[str]) -> None:
 def _public_name(
     app: Sphinx, environment: BuildEnvironment, node: pending_xref, content: nodes.Element
 ) -> nodes.Element | None:
-    """Find `physics.observer.Observer`, as type hints say, where it is documented: `physics.Observer`."""
-    target = node.get("reftarget", "")
-    found = re.fullmatch(r"physics\.[\w.]+\.(\w+)", target)
-    if node.get("refdomain") != "py" or found is None or found[1] not in physics.__all__:
+    """Find `physics.kerr.observer.Observer`, as type hints say, where it is documented: `physics.Observer`."""
+    name = PUBLIC_NAMES.get(node.get("reftarget", ""))
+    if node.get("refdomain") != "py" or name is None:
         return None
     return environment.get_domain("py").resolve_xref(
-        environment, node["refdoc"], app.builder, node["reftype"], f"physics.{found[1]}", node, content
+        environment, node["refdoc"], app.builder, node["reftype"], f"physics.{name}", node, content
     )
 
 

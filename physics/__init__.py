@@ -1,16 +1,100 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rays of light around a spinning (Kerr) black hole, and the warp maps made of them."""
+"""Rays of light around a spinning (Kerr) black hole, and the maps and pictures made of them.
 
+Hands on the documented API, which is all that the add-on and other programs use. The rooms, from camera and hole to a
+file: `shot`, `kerr`, `geodesics`, `sampling`, `disk_passes`, `maps`, `files`; `light` and `reference` turn maps into
+pictures, `accuracy_check` judges them, `cli` is the command line, `images` and `numerics` serve all.
+"""
+
+from .accuracy_check.accuracy import (
+    DEFAULT_ENVIRONMENT_WIDTH,
+    accuracy_steps,
+    check_accuracy,
+)
+from .accuracy_check.accuracy import DEFAULT_SAMPLES as DEFAULT_ACCURACY_SAMPLES
+from .accuracy_check.accuracy_report import AccuracyReport, DiskAccuracy
 from .disk_passes.disk_pass import DiskPass
-from .files.disk_pass_file import read_disk_pass, write_disk_pass
+from .files.disk_pass_file import FORMAT as DISK_PASS_FORMAT
+from .files.disk_pass_file import (
+    find_pass,
+    pass_path,
+    read_disk_pass,
+    read_disk_passes,
+    write_disk_pass,
+    write_disk_passes,
+)
+from .files.exit_map_file import FORMAT as EXIT_MAP_FORMAT
+from .files.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
+from .files.map_check import Finding as MapFinding
+from .files.map_check import State as MapState
+from .files.map_check import check_map
+from .files.map_file import MapFormat
+from .files.warp_map_file import FORMAT as WARP_MAP_FORMAT
 from .files.warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
+from .files.world_map_file import FORMAT as WORLD_MAP_FORMAT
+from .files.world_map_file import read_world_map, read_world_map_metadata, write_world_map
 from .geodesics.disk_tracer import DEFAULT_CROSSINGS, MOST_CROSSINGS, DiskResult, trace_disk
 from .geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS, Fate, TraceResult, trace_rays
+from .images.exr import read_exr, read_exr_header, write_exr
+from .images.exr import replacing as replacing_file
+from .images.exr import target_of as temporary_target
+from .images.png import write_png
+from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
 from .kerr.observer import Observer
+from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
+from .light.color import CHANNEL_WAVELENGTHS, SECOND_RADIATION_CONSTANT, redshift_gain
+from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
+from .light.disk_flux import PROFILES as DISK_PROFILES
+from .light.disk_flux import page_thorne_flux
+from .light.disk_flux import peak_flux as peak_disk_flux
+from .light.disk_flux import peak_radius as peak_disk_radius
+from .light.disk_flux import relative_flux as relative_disk_flux
+from .light.disk_look import BOLOMETRIC as BOLOMETRIC_EXPONENT
+from .light.disk_look import COLDEST as COLDEST_DISK
+from .light.disk_look import COLORS as DISK_COLOR_COUNT
+from .light.disk_look import HOTTEST as HOTTEST_DISK
+from .light.disk_look import MONOCHROMATIC as MONOCHROMATIC_EXPONENT
+from .light.disk_look import OPACITY_REACH as DISK_OPACITY_REACH
+from .light.disk_look import PRESETS as DISK_PRESETS
+from .light.disk_look import SMALLEST_ALPHA, SMALLEST_G, DiskLook
+from .light.disk_look import density as disk_density
+from .light.disk_look import emission as disk_emission
+from .light.disk_look import fade as disk_fade
+from .light.disk_look import seen_color as disk_color
+from .light.disk_look import shade as shade_disk
+from .light.disk_look import tinted_light as tinted_disk_light
+from .light.disk_texture import TURN_BETWEEN as DISK_PATTERN_TURN
+from .light.disk_texture import disk_texture
+from .light.disk_texture import pattern_period as disk_pattern_period
+from .light.disk_texture import pattern_shares as disk_pattern_shares
+from .light.star_sky import star_sky
+from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
+from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
+from .maps.lens import LensNumbers
 from .maps.sharing import MapBaker, turned_map
 from .maps.warp_map import WarpMap, bake, bake_steps
+from .maps.world_map import FINAL as WORLD_MAP_GRID
+from .maps.world_map import HEADER_PARTS as WORLD_MAP_HEADER_PARTS
+from .maps.world_map import PREVIEW as WORLD_MAP_PREVIEW_GRID
+from .maps.world_map import SHORTEST as WORLD_MAP_SHORTEST
+from .maps.world_map import STAMP as WORLD_MAP_STAMP
+from .maps.world_map import WorldMap
+from .maps.world_map import world_map_steps as bake_world_map_steps
+from .maps.world_map import world_parameters as world_map_parameters
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
+from .numerics.work import drain
+from .reference.disk_render import disk_layers
+from .reference.disk_render import over_sky as disk_over_sky
+from .reference.reference_render import (
+    ANGLE_SLACK,
+    LARGEST_ONE_PLUS_Z,
+    SMALLEST_ONE_PLUS_Z,
+    ReferencePicture,
+)
+from .reference.reference_render import HALVE_ABOVE as RESIZE_HALVE_ABOVE
+from .reference.reference_render import MAGENTA as INVALID_MAP_COLOR
+from .reference.reference_render import render as render_reference
 from .shot.cameras import PanoramaCamera, PerspectiveCamera
 from .shot.disk import Disk
 from .shot.map_parameters import (
@@ -24,42 +108,132 @@ from .shot.map_parameters import (
 )
 
 __all__ = [
+    "ANGLE_SLACK",
+    "BOLOMETRIC_EXPONENT",
+    "CHANNEL_WAVELENGTHS",
+    "COLDEST_DISK",
+    "DEFAULT_ACCURACY_SAMPLES",
     "DEFAULT_CROSSINGS",
+    "DEFAULT_ENVIRONMENT_WIDTH",
     "DEFAULT_INTERPOLATION",
+    "DEFAULT_LENS_RADIUS",
     "DEFAULT_METHOD",
+    "DEFAULT_SKY_TEMPERATURE",
     "DEFAULT_TOLERANCE",
+    "DISK_COLOR_COUNT",
+    "DISK_OPACITY_REACH",
+    "DISK_PASS_FORMAT",
+    "DISK_PATTERN_TURN",
+    "DISK_PRESETS",
+    "DISK_PROFILES",
+    "EXIT_MAP_FORMAT",
+    "HOTTEST_DISK",
     "IDENTITY",
+    "INVALID_MAP_COLOR",
+    "LARGEST_ONE_PLUS_Z",
     "METHODS",
+    "MONOCHROMATIC_EXPONENT",
     "MOST_CROSSINGS",
     "MOTIONS",
+    "RESIZE_HALVE_ABOVE",
+    "SECOND_RADIATION_CONSTANT",
+    "SMALLEST_ALPHA",
+    "SMALLEST_G",
+    "SMALLEST_ONE_PLUS_Z",
     "SUPERSAMPLING",
+    "WARP_MAP_FORMAT",
+    "WORLD_MAP_FORMAT",
+    "WORLD_MAP_GRID",
+    "WORLD_MAP_HEADER_PARTS",
+    "WORLD_MAP_PREVIEW_GRID",
+    "WORLD_MAP_SHORTEST",
+    "WORLD_MAP_STAMP",
+    "AccuracyReport",
     "Background",
     "BlackHoleError",
     "Cancelled",
     "Disk",
+    "DiskAccuracy",
+    "DiskLook",
     "DiskPass",
     "DiskResult",
+    "ExitMap",
     "Fate",
     "ImageFileError",
+    "LensNumbers",
     "MapBaker",
+    "MapFinding",
+    "MapFormat",
+    "MapState",
     "Observer",
     "PanoramaCamera",
     "PerspectiveCamera",
+    "ReferencePicture",
     "TraceResult",
     "UnstableOrbitWarning",
     "WarpMap",
     "WarpMapError",
     "WarpMapParameters",
+    "WorldMap",
+    "accuracy_steps",
     "bake",
+    "bake_exit_map",
+    "bake_exit_map_steps",
     "bake_steps",
+    "bake_world_map_steps",
+    "check_accuracy",
+    "check_map",
+    "disk_color",
+    "disk_density",
+    "disk_emission",
+    "disk_fade",
+    "disk_layers",
+    "disk_over_sky",
+    "disk_pattern_period",
+    "disk_pattern_shares",
+    "disk_texture",
+    "drain",
+    "ergosphere_radius",
+    "find_pass",
+    "horizon_radius",
+    "isco_radius",
     "looking_at_hole",
+    "matter_direction",
+    "orbital_frequency",
+    "page_thorne_flux",
+    "pass_path",
+    "peak_disk_flux",
+    "peak_disk_radius",
+    "photon_orbit_radius",
     "read_disk_pass",
+    "read_disk_passes",
+    "read_exit_map",
+    "read_exit_map_metadata",
+    "read_exr",
+    "read_exr_header",
     "read_warp_map",
     "read_warp_map_metadata",
+    "read_world_map",
+    "read_world_map_metadata",
+    "redshift_factor",
+    "redshift_gain",
+    "relative_disk_flux",
+    "render_reference",
+    "replacing_file",
+    "shade_disk",
+    "star_sky",
+    "temporary_target",
+    "tinted_disk_light",
     "trace_disk",
     "trace_rays",
     "turned_map",
     "unstable_orbit_warning",
+    "world_map_parameters",
     "write_disk_pass",
+    "write_disk_passes",
+    "write_exit_map",
+    "write_exr",
+    "write_png",
     "write_warp_map",
+    "write_world_map",
 ]

@@ -46,8 +46,8 @@ def disk_layers(
 
     Notes
     -----
-    For each crossing in turn, with t = 1 at first and alpha = opacity x coverage: light += t alpha emission,
-    t *= 1 - alpha.
+    For each crossing in turn, with t = 1 at first and alpha = opacity x coverage: ``light += t alpha emission``, then
+    ``t *= 1 - alpha``.
     """
     look.validate()
     if not passes or len({one.metadata["hash"] for one in passes}) != 1:

@@ -40,7 +40,7 @@ class SmallBlender:
 
     def parse(self, words):
         """Have the add-on's command parse its words."""
-        self._request.getfixturevalue("addon_module")("command")._parser().parse_args(words)
+        self._request.getfixturevalue("addon_module")("command.command_line")._parser().parse_args(words)
 
 
 @pytest.fixture
