@@ -261,7 +261,7 @@ def _remove(doomed: list[tuple[Path, Path, str]], dry_run: bool) -> Cleaning:
                 continue
             removal = Removal(path, reason, _size(path))
             try:
-                if claims.is_taken(owner, watch=False) if dry_run else not claims.take(owner, watch=False):
+                if claims.is_taken(owner) if dry_run else not claims.take(owner):
                     cleaning.in_use.append(path)
                     continue
                 if not dry_run:

@@ -1,291 +1,196 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Claims: which process is making which file, so that several, on one machine or many, can fill a folder together.
+"""Claims: a small file beside each map says which process is baking it, so that several can fill a folder together.
 
-A claim is a small file beside the one that it is for, made in one step that fails if it is there already (a link, or
-O_CREAT with O_EXCL), which network file systems keep to as well; no locks are relied upon. It says who holds it, and
-its time is renewed as a sign of life. Whoever claims a file looks first whether that has been made in the meantime, and
-files are replaced whole, so that the worst that a mistaken claim can do is work done twice.
+The file is created exclusively, which network file systems support, and its time is renewed during the bake. A claim is
+dead if its process has ended on this machine, or if it was not renewed for `STALE_AFTER` by the file system's clock.
 
-A claim is dead if its process is gone, as far as that can be seen on the same machine; or if it has shown no sign of
-life for `STALE_AFTER`, by the file system's clock (that of a file made there now) or by the watch of the observer.
-Clocks of different machines are never compared. The claim of a dead process stays where it is, and the next
-*generation* is claimed beside it, in one step again: so no two processes can take over from the same one.
+A claim only saves work: maps are replaced atomically, and every process checks a map again once it has claimed it. The
+worst that a mistaken claim can cause is a map that is baked twice.
 """
 
-from __future__ import annotations
-
+import contextlib
 import json
 import os
 import platform
 import re
 import tempfile
 import time
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
-# Seconds between signs of life, and without one until a claim is nobody's.
+# Seconds between renewals, and seconds without one after which a claim is dead.
 HEARTBEAT = 5.0
 STALE_AFTER = 60.0
 
-# However old a claim looks, it is watched for so long before it is taken over from another machine.
-LEAST_WATCH = 2.5 * HEARTBEAT
+_NAME = re.compile(r"\.(.+)\.claim(\.next|\d*)")
 
-_NAME = re.compile(r"\.(.+)\.claim\d+")
-
-# Files that this process holds a claim to.
+# Files that this process has claimed.
 _own: set[Path] = set()
 
 
-def claim_path(target: Path, generation: int = 1) -> Path:
-    """Return where the claim of a file lies, hidden beside it."""
-    return target.with_name(f".{target.name}.claim{generation}")
+def claim_path(target: Path) -> Path:
+    """Return the path of a file's claim, hidden beside it."""
+    return target.with_name(f".{target.name}.claim")
 
 
 def claimed_name(name: str) -> str | None:
-    """Return the name of the file that a claim's file is for; None for any other name."""
+    """Return the name of the file that a claim is for, or None if the name is not that of a claim."""
     match = _NAME.fullmatch(name)
     return None if match is None else match[1]
 
 
-@dataclass(frozen=True)
-class Holder:
-    """Whose a claim is."""
-
-    host: str
-    process: int
-    machine: str
-    """What tells one running system, and container, from any other."""
-    started: str
-    """When the process began, on its machine; it tells a process from a later one of the same number."""
-
-    @classmethod
-    def this(cls) -> Holder:
-        """Return this process."""
-        return cls(platform.node(), os.getpid(), _machine(), _process_start(os.getpid()) or "")
-
-    @classmethod
-    def read(cls, content: bytes) -> Holder | None:
-        """Return the holder that a claim names; None if it names none, because it is just being written."""
-        try:
-            values = json.loads(content)
-            return cls(str(values["host"]), int(values["process"]), str(values["machine"]), str(values["started"]))
-        except (ValueError, KeyError, TypeError):
-            return None
-
-    def to_bytes(self) -> bytes:
-        """Return what a claim's file says."""
-        return json.dumps(self.__dict__).encode()
-
-    def __str__(self) -> str:
-        return f"{self.host or 'another machine'} (process {self.process})"
-
-    def is_gone(self) -> bool:
-        """Whether the process has certainly ended; unknown, hence False, on other machines."""
-        if self.machine != _machine() or os.name != "posix":
-            return False
-        try:
-            os.kill(self.process, 0)
-        except ProcessLookupError:
-            return True
-        except OSError:
-            return False
-        start = _process_start(self.process)
-        return bool(self.started) and start is not None and start != self.started
-
-
-@cache
-def _machine() -> str:
-    """Return what tells this running system from others: containers may share a name, or the numbers of processes."""
-    parts = [platform.node()]
-    try:
-        parts.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip())
-        parts.append(os.readlink("/proc/self/ns/pid"))
-    except OSError:  # not Linux
-        pass
-    return " ".join(parts)
-
-
-def _process_start(process: int) -> str | None:
-    """Return when a process began, in the system's own unit; "ended" for a zombie; None if that is unknown."""
-    try:
-        text = Path(f"/proc/{process}/stat").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return None
-    fields = text.rpartition(")")[2].split()  # the name before may hold anything
-    return "ended" if fields[0] == "Z" else fields[19]
-
-
-@dataclass
-class _Sighting:
-    signature: tuple[int, bytes]
-    since: float
-
-
-@dataclass
-class _Held:
-    path: Path
-    generation: int
-    beaten: float
-
-
 class Claims:
-    """The claims that one piece of work holds, and what it knows of those of others. Use `with`: it releases them."""
+    """The claims of one bake or render. Use it as a context manager, which releases them."""
 
     def __init__(self) -> None:
-        self._held: dict[Path, _Held | None] = {}
-        self._sightings: dict[Path, _Sighting] = {}
+        self._held: dict[Path, bytes | None] = {}
+        """Contents of the claims; None where other work of this process has claimed the file."""
+        self._renewed = time.monotonic()
 
-    def take(self, target: Path, *, watch: bool = True) -> bool:
-        """Claim a file; return False while another process, which seems to be alive, has it.
+    def take(self, target: Path) -> bool:
+        """Claim a file; return False while another process that seems to be alive has claimed it.
 
-        Parameters
-        ----------
-        target : Path
-            The file to be made. Look whether it is there already once it is claimed.
-        watch : bool
-            Watch another machine's claim for a while, over several calls, before taking it over; otherwise its age by
-            the file system's clock is taken at its word.
+        Check whether the file exists already once it is claimed.
 
         Raises
         ------
         OSError
-            When the folder cannot be written to.
+            If the folder cannot be written to.
         """
         if target in self._held:
             return True
-        if target in _own:  # another piece of work of this process: waiting for it would be for ever
-            self._held[target] = None
-            return True
-        generation = 1
-        while True:
-            path = claim_path(target, generation)
-            try:
-                _make(path, Holder.this().to_bytes())
-            except FileExistsError:
-                if not self._is_dead(path, watch):
-                    return False
-                generation += 1
-                continue
-            break
-        later = claim_path(target, generation + 1)
-        if later.exists() and not self._is_dead(later, watch):
-            path.unlink(missing_ok=True)  # it was one of a dead process, and has been taken over already
-            return False
-        self._held[target] = _Held(path, generation, time.monotonic())
-        _own.add(target)
+        content = None
+        if target not in _own:  # waiting for other work of this process would never end
+            path, content = claim_path(target), json.dumps({**_this_process(), "time": time.time()}).encode()
+            if not _create(path, content) and not _take_over(path, content):
+                return False
+            _own.add(target)
+        self._held[target] = content
         return True
 
     def owns(self, target: Path) -> bool:
-        """Whether a file was claimed by this very piece of work, and not by another one of the same process."""
+        """Whether this very work has claimed a file, not other work of the same process."""
         return self._held.get(target) is not None
 
-    def is_taken(self, target: Path, *, watch: bool = True) -> bool:
-        """Whether a process that seems to be alive has claimed a file; nothing is claimed by asking."""
-        if target in _own:
-            return True
-        generation = 1
-        while (path := claim_path(target, generation)).exists():
-            if not self._is_dead(path, watch):
-                return True
-            generation += 1
-        return False
+    def is_taken(self, target: Path) -> bool:
+        """Whether a process that seems to be alive has claimed a file; nothing is claimed."""
+        path = claim_path(target)
+        return target in _own or (path.exists() and not _is_dead(path))
 
     def holder(self, target: Path) -> str:
-        """Return whose the claim to a file is, for a message."""
-        generation, found = 1, None
-        while True:
-            try:
-                found = Holder.read(claim_path(target, generation).read_bytes())
-            except OSError:
-                return "another process" if found is None else str(found)
-            generation += 1
+        """Return who has claimed a file, for a message."""
+        found = _read(claim_path(target))
+        return f"{found.get('host')} (process {found.get('process')})" if found else "another process"
 
     def beat(self) -> None:
-        """Give a sign of life, if the last one was long enough ago; call it often."""
+        """Renew the claims if the last time was `HEARTBEAT` ago; call it often."""
         now = time.monotonic()
-        for held in self._held.values():
-            if held is not None and now - held.beaten >= HEARTBEAT:
-                held.beaten = now
-                try:
-                    os.utime(held.path)  # the file server's own time
-                except OSError:
-                    continue  # it was removed, or the network is away: the work goes on
+        if now - self._renewed < HEARTBEAT:
+            return
+        self._renewed = now
+        for target, content in self._held.items():
+            if content is not None:
+                with contextlib.suppress(OSError):  # it was removed, or the network is down
+                    os.utime(claim_path(target))
 
     def release(self, target: Path) -> None:
-        """Give a claim back, and with it those of dead processes that it was taken over from."""
-        held = self._held.pop(target, None)
-        if held is None:
+        """Delete a claim, unless another process has taken it over."""
+        content = self._held.pop(target, None)
+        if content is None:
             return
         _own.discard(target)
-        for generation in range(held.generation, 0, -1):
-            try:
-                claim_path(target, generation).unlink(missing_ok=True)
-            except OSError:
-                continue  # it will be found dead
+        path = claim_path(target)
+        with contextlib.suppress(OSError):
+            if path.read_bytes() == content:
+                path.unlink()
 
-    def _is_dead(self, path: Path, watch: bool) -> bool:
-        try:
-            # opening, unlike asking for the time alone, makes network file systems look what is on the server
-            with path.open("rb") as stream:
-                content = stream.read()
-                changed = os.fstat(stream.fileno()).st_mtime_ns
-        except OSError:
-            return False  # it is just being given back
-        holder = Holder.read(content)
-        if holder is not None and holder.is_gone():
-            return True
-        if holder is not None and holder == Holder.this():
-            return True  # this process's own, which `_own` would know if it were in use
-        now = time.monotonic()
-        sighting = self._sightings.get(path)
-        if sighting is None or sighting.signature != (changed, content):
-            sighting = self._sightings[path] = _Sighting((changed, content), now)
-        quiet = now - sighting.since
-        if quiet >= (STALE_AFTER if holder is not None else LEAST_WATCH):
-            return True
-        if watch and quiet < LEAST_WATCH:
-            return False
-        return _file_system_time(path.parent) - changed >= STALE_AFTER * 1e9
-
-    def __enter__(self) -> Claims:
+    def __enter__(self) -> "Claims":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: Any, trace: TracebackType | None) -> None:
-        """Give all claims back."""
+    def __exit__(self, *_error: object) -> None:
+        """Release all claims."""
         for target in list(self._held):
             self.release(target)
 
 
-def _make(path: Path, content: bytes) -> None:
-    """Make a claim with its content in one step.
-
-    Raises
-    ------
-    FileExistsError
-        When it is there already.
-    """
-    target = path.with_name(str(claimed_name(path.name)))
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=path.parent)
-    draft = Path(name)
+def _create(path: Path, content: bytes) -> bool:
+    """Create a file, or return False if it exists."""
     try:
-        with os.fdopen(handle, "wb") as stream:
+        with path.open("xb") as stream:
             stream.write(content)
-        try:
-            os.link(draft, path)
-        except FileExistsError:
-            if not draft.exists() or draft.stat().st_nlink != 2:  # 2: the server did it, and its answer was lost
-                raise
-        except OSError:  # a file system without links: two steps, and whoever comes between finds no name yet
-            with path.open("xb") as stream:
-                stream.write(content)
-    finally:
-        draft.unlink(missing_ok=True)
+    except FileExistsError:
+        return False
+    return True
+
+
+def _take_over(path: Path, content: bytes) -> bool:
+    """Replace a claim if it is dead. Only one process at a time can create the file that replaces it."""
+    if not _is_dead(path):
+        return False
+    successor = path.with_name(f"{path.name}.next")
+    if not _create(successor, content):
+        if _is_dead(successor):  # its process was killed just here
+            successor.unlink(missing_ok=True)
+        return False
+    if not _is_dead(path):  # another process was faster
+        successor.unlink(missing_ok=True)
+        return False
+    try:
+        successor.replace(path)
+    except OSError:  # another user's claim in a shared folder: go on without one
+        successor.unlink(missing_ok=True)
+    return True
+
+
+def _is_dead(path: Path) -> bool:
+    found, this = _read(path), _this_process()
+    same_machine = all(found.get(key) == this[key] for key in ("host", "namespace"))
+    if same_machine and _has_ended(found.get("process")):
+        return True
+    try:
+        changed = path.stat().st_mtime_ns  # up to date on network file systems too, as the file was opened before
+    except OSError:
+        return False  # it was released just now
+    return abs(_file_system_time(path.parent) - changed) >= STALE_AFTER * 1e9
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Return what a claim says; nothing if it cannot be read, or is just being written."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _this_process() -> dict[str, Any]:
+    try:
+        namespace = os.readlink("/proc/self/ns/pid")  # containers on one host number their processes themselves
+    except OSError:  # not Linux
+        namespace = ""
+    return {"host": platform.node(), "namespace": namespace, "process": os.getpid()}
+
+
+def _has_ended(process: Any) -> bool:
+    """Whether a process of this machine has certainly ended."""
+    if process == os.getpid():  # a former one of the same number: what this one has claimed is in `_own`
+        return True
+    if os.name != "posix":
+        return False
+    try:
+        os.kill(process, 0)
+        status = Path(f"/proc/{process}/stat").read_text(encoding="ascii", errors="replace")
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError, TypeError):  # another user's process, not Linux, or not a number
+        return False
+    return status.rpartition(")")[2].split()[0] == "Z"  # killed, but its parent has not asked for its exit status
 
 
 def _file_system_time(folder: Path) -> int:
-    """Return the time, in nanoseconds, that the file system gives a file made now."""
-    with tempfile.TemporaryFile(dir=folder) as probe:
-        return os.fstat(probe.fileno()).st_mtime_ns
+    """Return the time, in nanoseconds, that the file system gives to a file created now."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            return os.fstat(probe.fileno()).st_mtime_ns
+    except OSError:  # a folder that can only be read
+        return time.time_ns()

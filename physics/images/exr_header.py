@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A look at an OpenEXR file before the library has it: is it whole, of a kind that is read here, and of a sane size?
+"""Check an OpenEXR file before the library reads it: is it complete, of a supported kind, and of a reasonable size?
 
-The library allocates what a header asks for before it finds that the file cannot hold that much, reads only the first
-of several parts, and tells of a damaged one in words for programmers. The layout is that of "OpenEXR File Layout",
-https://openexr.com/en/latest/OpenEXRFileLayout.html; all numbers are little-endian.
+The library alone is not enough. It allocates what a header asks for before it notices that the file is too short, reads
+an unknown compression as ZIP, and only the first of several parts. It reports damage on the standard streams instead of
+in its exceptions. Before release 3.4 it cannot read a header by itself.
+
+The layout is that of "OpenEXR File Layout", https://openexr.com/en/latest/OpenEXRFileLayout.html; numbers are
+little-endian.
 """
 
 from __future__ import annotations
 
+import math
 import struct
-from dataclasses import dataclass
 from typing import BinaryIO
 
 MAGIC = b"\x76\x2f\x31\x01"
@@ -19,11 +22,8 @@ VERSION = 2
 TILED, LONG_NAMES, NON_IMAGE, MULTIPART = 0x200, 0x400, 0x800, 0x1000
 KNOWN = 0xFF | TILED | LONG_NAMES | NON_IMAGE | MULTIPART
 
-SHORT_NAME, LONG_NAME = 31, 255
-# Previews and the like make headers of some hundred kilobytes.
-LARGEST_ATTRIBUTE = 64 << 20
+LONGEST_NAME = 255
 MOST_ATTRIBUTES = 10_000
-MOST_CHANNELS = 1024
 
 # Picture sides and pixels beyond any camera or sky: a sky of 32768 x 16384 is read.
 LARGEST_SIDE = 1 << 17
@@ -36,60 +36,15 @@ LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32, 256, 1)
 # (RFC 1951), which PXR24 uses too after it has left out a byte in four. Others may make nothing of an even picture.
 LARGEST_RATIO = {0: 1.0, 1: 64.0, 2: 1032.0, 3: 1032.0, 5: 4.0 / 3.0 * 1032.0}
 
-# Bytes of a pixel, by the number of its type: unsigned, half, float.
-PIXEL_BYTES = (4, 2, 4)
+# Bytes per pixel, by the number of a channel's type: unsigned, half, float.
+PIXEL_BYTES = {0: 4, 1: 2, 2: 4}
+
+# Values by name and type.
+Attributes = dict[tuple[str, str], bytes]
 
 
 class BadHeader(Exception):
     """What is wrong, as the rest of a sentence that begins with the file's name."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """What the header of a file's part says about its pixels."""
-
-    attributes: dict[str, tuple[str, bytes]]
-    """Type and value by name."""
-
-    def box(self, name: str) -> tuple[int, int, int, int]:
-        """Return left, top, right and bottom of a window, inclusive."""
-        left, top, right, bottom = struct.unpack("<4i", self._value(name, "box2i", 16))
-        return left, top, right, bottom
-
-    @property
-    def compression(self) -> int:
-        """The number of the compression."""
-        number = self._value("compression", "compression", 1)[0]
-        if number >= len(LINES):
-            raise BadHeader(f"is compressed in a way that is not known here ({number})")
-        return number
-
-    @property
-    def bytes_per_pixel(self) -> int:
-        """Bytes of all channels of a pixel."""
-        kind, value = self.attributes.get("channels", ("", b""))
-        if kind != "chlist":
-            raise BadHeader("is damaged: its header has no channels")
-        total, place, count = 0, 0, 0
-        while place < len(value) and value[place]:
-            end = value.find(b"\0", place, place + LONG_NAME + 1)
-            if end < 0 or end + 17 > len(value) or count >= MOST_CHANNELS:
-                raise BadHeader("is damaged: its channels cannot be read")
-            pixel_type, x_sampling, y_sampling = struct.unpack_from("<i4x2i", value, end + 1)
-            if not 0 <= pixel_type < len(PIXEL_BYTES):
-                raise BadHeader("is damaged: its channels cannot be read")
-            if (x_sampling, y_sampling) != (1, 1):
-                raise BadHeader("holds channels of a lower resolution; save it as plain RGB")
-            total, place, count = total + PIXEL_BYTES[pixel_type], end + 17, count + 1
-        if not count or place >= len(value):
-            raise BadHeader("is damaged: its channels cannot be read")
-        return total
-
-    def _value(self, name: str, kind: str, size: int) -> bytes:
-        found, value = self.attributes.get(name, ("", b""))
-        if found != kind or len(value) != size:
-            raise BadHeader(f"is damaged: its header has no {name}")
-        return value
 
 
 def check(stream: BinaryIO, size: int, *, whole: bool) -> None:
@@ -102,109 +57,104 @@ def check(stream: BinaryIO, size: int, *, whole: bool) -> None:
     size : int
         Bytes of the file.
     whole : bool
-        Whether its pixels are to be read as well: then they must all be there.
+        Whether its pixels are to be read as well. Then they must all be there.
 
     Raises
     ------
     BadHeader
-        It is not a file that can be read.
+        If the file cannot be read.
     """
-    reader = _Reader(stream, size)
-    if reader.take(min(4, size)) != MAGIC:
+    if stream.read(4) != MAGIC:
         raise BadHeader("is not an OpenEXR file")
-    (version,) = struct.unpack("<I", reader.take(4))
+    (version,) = struct.unpack("<I", _take(stream, 4, size))
     if version & 0xFF != VERSION or version & ~KNOWN:
         raise BadHeader("is of a version of OpenEXR that is not known here")
-    if version & NON_IMAGE:
+    header = _read_attributes(stream, size)
+    kind = header.get(("type", "string"), b"")
+    if version & NON_IMAGE or kind.startswith(b"deep"):
         raise BadHeader("holds deep data, not a picture")
-    part = _read_part(reader, bool(version & LONG_NAMES))
-    if version & MULTIPART:
-        if part.attributes.get("type", ("", b""))[1] not in (b"scanlineimage", b"tiledimage"):
-            raise BadHeader("holds deep data, not a picture")
-        if reader.take(1) != b"\0":
-            raise BadHeader("holds several parts; save the picture by itself")
-    pixels = _check_size(part, size)
-    tiled = bool(version & TILED) or part.attributes.get("type", ("", b""))[1] == b"tiledimage"
-    if whole and not tiled:
-        _check_chunks(reader, part.compression, pixels[1], bool(version & MULTIPART))
+    if version & MULTIPART and _take(stream, 1, size) != b"\0":
+        raise BadHeader("holds several parts; save the picture by itself")
+    try:
+        compression, height = _check_size(header, size)
+    except KeyError as error:
+        raise BadHeader(f"is damaged: its header has no {error.args[0][0]}") from error
+    except struct.error as error:
+        raise BadHeader("is damaged: its header cannot be read") from error
+    if whole and not version & TILED and kind != b"tiledimage":
+        _check_chunks(stream, size, -(-height // LINES[compression]), 12 if version & MULTIPART else 8)
 
 
-def _check_size(part: Part, size: int) -> tuple[int, int]:
-    """Return width and height, or refuse them."""
-    left, top, right, bottom = part.box("dataWindow")
+def _take(stream: BinaryIO, count: int, size: int) -> bytes:
+    """Read the next bytes; never ask for more than the file has."""
+    data = stream.read(count) if 0 <= count <= size - stream.tell() else b""
+    if len(data) != count:
+        raise BadHeader("is cut short or damaged in its header")
+    return data
+
+
+def _read_attributes(stream: BinaryIO, size: int) -> Attributes:
+    """Read one header, up to and including the zero byte that ends it."""
+    found: Attributes = {}
+    while name := _read_text(stream):
+        key = name, _read_text(stream)
+        (count,) = struct.unpack("<i", _take(stream, 4, size))
+        if key in found or len(found) >= MOST_ATTRIBUTES:
+            raise BadHeader("is damaged: its header cannot be read")
+        found[key] = _take(stream, count, size)
+    return found
+
+
+def _read_text(stream: BinaryIO) -> str:
+    """Read a text that ends with a zero byte."""
+    begin = stream.tell()
+    text, end, _rest = stream.read(LONGEST_NAME + 1).partition(b"\0")
+    if not end:
+        raise BadHeader("is cut short or damaged in its header")
+    stream.seek(begin + len(text) + 1)
+    return text.decode("latin-1")
+
+
+def _check_size(header: Attributes, size: int) -> tuple[int, int]:
+    """Return compression and height in pixels, if a file of this many bytes can hold the picture."""
+    (compression,) = struct.unpack("<B", header["compression", "compression"])
+    if compression >= len(LINES):
+        raise BadHeader(f"is compressed in a way that is not known here ({compression})")
+    left, top, right, bottom = struct.unpack("<4i", header["dataWindow", "box2i"])
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1:
         raise BadHeader("is damaged: its size is not one")
     if max(width, height) > LARGEST_SIDE or width * height > MOST_PIXELS:
         raise BadHeader(f"is {width} x {height} pixels large, which is more than can be read here")
-    if part.box("displayWindow") != (left, top, right, bottom):
+    if header["displayWindow", "box2i"] != header["dataWindow", "box2i"]:
         raise BadHeader("holds a crop of a larger picture, or one with a margin; save it whole")
-    needed = width * height * part.bytes_per_pixel
-    ratio = LARGEST_RATIO.get(part.compression)
-    if ratio is not None and needed > ratio * size:
+    needed = width * height * _bytes_per_pixel(header["channels", "chlist"])
+    if needed > LARGEST_RATIO.get(compression, math.inf) * size:
         raise BadHeader(f"is cut short: {size} bytes cannot hold {width} x {height} pixels")
-    return width, height
+    return compression, height
 
 
-def _check_chunks(reader: _Reader, compression: int, height: int, multipart: bool) -> None:
-    """Refuse a file of scan lines whose table or pixels are not all there."""
-    count = -(-height // LINES[compression])
-    table = reader.take(8 * count)
-    first = reader.place
-    head = 12 if multipart else 8  # the part's number, the first line, the number of bytes
-    for (offset,) in struct.iter_unpack("<Q", table):
-        if not first <= offset <= reader.size - head:
-            raise BadHeader("is cut short: not all of its pixels are there")
-        reader.go_to(offset)
-        (length,) = struct.unpack("<i", reader.take(head)[-4:])
-        if not 0 <= length <= reader.size - reader.place:
-            raise BadHeader("is cut short: not all of its pixels are there")
+def _bytes_per_pixel(channels: bytes) -> int:
+    """Return the bytes of all channels of a pixel."""
+    total = place = 0
+    try:
+        while channels[place]:
+            end = channels.index(0, place) + 1
+            kind, *sampling = struct.unpack_from("<i4x2i", channels, end)
+            if sampling != [1, 1]:
+                raise BadHeader("holds channels of a lower resolution; save it as plain RGB")
+            total, place = total + PIXEL_BYTES[kind], end + 16
+    except (LookupError, ValueError, struct.error) as error:
+        raise BadHeader("is damaged: its channels cannot be read") from error
+    return total
 
 
-class _Reader:
-    """Takes bytes from a file, and never more than there are."""
-
-    def __init__(self, stream: BinaryIO, size: int) -> None:
-        self._stream = stream
-        self.size = size
-        self.place = 0
-
-    def take(self, count: int) -> bytes:
-        """Return the next bytes."""
-        if not 0 <= count <= self.size - self.place:
-            raise BadHeader("is cut short in its header")
-        data = self._stream.read(count)
-        if len(data) != count:
-            raise BadHeader("is cut short in its header")
-        self.place += count
-        return data
-
-    def text(self, longest: int) -> str:
-        """Return the next text that ends with a zero byte."""
-        found = bytearray()
-        while (byte := self.take(1)) != b"\0":
-            found += byte
-            if len(found) > longest:
-                raise BadHeader("is damaged: its header cannot be read")
-        try:
-            return found.decode()
-        except UnicodeDecodeError as error:
-            raise BadHeader("is damaged: its header cannot be read") from error
-
-    def go_to(self, place: int) -> None:
-        """Go on from another place."""
-        self._stream.seek(place)
-        self.place = place
-
-
-def _read_part(reader: _Reader, long_names: bool) -> Part:
-    """Read one header, up to and including the zero byte that ends it."""
-    longest = LONG_NAME if long_names else SHORT_NAME
-    attributes: dict[str, tuple[str, bytes]] = {}
-    while name := reader.text(longest):
-        kind = reader.text(longest)
-        (count,) = struct.unpack("<i", reader.take(4))
-        if not 0 <= count <= LARGEST_ATTRIBUTE or len(attributes) >= MOST_ATTRIBUTES or name in attributes:
-            raise BadHeader("is damaged: its header cannot be read")
-        attributes[name] = (kind, reader.take(count))
-    return Part(attributes)
+def _check_chunks(stream: BinaryIO, size: int, count: int, head: int) -> None:
+    """Refuse a file of scan lines whose table of chunks, or whose last chunk, is incomplete."""
+    table = struct.unpack(f"<{count}Q", _take(stream, 8 * count, size))
+    first, last = stream.tell(), max(table)
+    stream.seek(min(last, size))
+    leader = stream.read(head)  # of the last chunk; ends with its length
+    length = int.from_bytes(leader[-4:], "little", signed=True)
+    if min(table) < first or len(leader) < head or not 0 <= length <= size - last - head:
+        raise BadHeader("is cut short: not all of its pixels are there")

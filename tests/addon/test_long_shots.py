@@ -162,7 +162,7 @@ def claim_elsewhere(path: Path, package: ModuleType) -> Path:
     """The claim of another machine."""
     path.parent.mkdir(exist_ok=True)
     made = package.claim_path(path)
-    made.write_bytes(package.Holder("farm-7", 12, "another machine", "").to_bytes())
+    made.write_text(json.dumps({"host": "farm-7", "process": 12}), encoding="utf-8")
     return made
 
 
