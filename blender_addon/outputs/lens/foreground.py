@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...scene import frame_setup
+from ...scene.camera_type import original_type
 from .. import registry
 from ..shared import tree_editing
 from ..shared.compositor_tree import ROLE, find_node, find_tree, has_scene_tree
@@ -147,7 +148,7 @@ def copy_lens(second: bpy.types.Scene, camera: bpy.types.Camera) -> None:
             value = getattr(source, name)
             if getattr(owner, name) != value:
                 setattr(owner, name, value)
-    original = lens_camera.original_type(camera)
+    original = original_type(camera)
     if plain.type != original:
         plain.type = original
 

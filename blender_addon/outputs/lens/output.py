@@ -70,8 +70,12 @@ class LensOutput(Output):
         return leaving.is_left(scene)
 
     def refresh(self, scene: bpy.types.Scene) -> None:
-        """Let the viewport see the scene as it stands."""
+        """Let the viewport see the scene as it stands, and the disk read the passes of the settings."""
         lens_sync.show_live(scene)
+        try:
+            lens_disk.refresh(scene)
+        except SceneError as error:
+            messages.warn(str(error))
 
     def refresh_disk(self, scene: bpy.types.Scene) -> None:
         """Put the disk over the lens's picture, or take it out."""
