@@ -127,9 +127,19 @@ class WorldMap:
 
 
 def world_parameters(parameters: WarpMapParameters, grid: tuple[int, int] = FINAL) -> WarpMapParameters:
-    """Return what a world map is made from: the place and its motion, whichever way the camera is turned.
+    """Return what a world map is made from: the place and its motion, whatever the camera's orientation.
 
-    The camera stands for the map's size alone; a disk has no part in it.
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+        A frame's. Camera, orientation, interpolation and disk do not matter.
+    grid : (int, int)
+        Position angles, and places between the edge and the opposite point of the sky.
+
+    Returns
+    -------
+    WarpMapParameters
+        With a panorama camera that stands for the size of the map's texture.
     """
     columns, rows = grid
     return replace(
@@ -143,17 +153,26 @@ def world_parameters(parameters: WarpMapParameters, grid: tuple[int, int] = FINA
 
 
 def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, WorldMap]:
-    """Trace a world map step by step: yields the fraction done after each block of rays, returns the map.
+    """Trace a world map step by step.
 
     Parameters
     ----------
     parameters : WarpMapParameters
         From `world_parameters`.
 
+    Yields
+    ------
+    float
+        The fraction done, 0 to 1, after each block of rays.
+
+    Returns
+    -------
+    WorldMap
+
     Raises
     ------
     BlackHoleError
-        Before the first step, when no map can be made from these parameters.
+        Before the first step, if no map can be made from these parameters.
     """
     parameters.validate()
     observer, columns, rows = parameters.observer(), parameters.camera.width, parameters.camera.height - 1
