@@ -24,7 +24,7 @@ from ..kerr.critical_curve import around_hole, edge_angles
 from ..kerr.observer import Observer
 from ..kerr.rays import rays_from_triad, redshift_vector
 from ..numerics.arrays import Array, Image
-from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.blocks import blocks
 from ..numerics.sphere import cos_sin, spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import IDENTITY, WarpMapParameters
@@ -185,11 +185,10 @@ def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, Wor
     looking = around_hole(edge + distances(heights)[:, None], aside, up).reshape(-1, 3)
     found = np.empty((len(looking), 3))
     fate = np.empty(len(looking), np.uint8)
-    for start in range(0, len(looking), BLOCK_SIZE):
-        block = slice(start, start + BLOCK_SIZE)
+    for block in blocks(len(looking)):
         rays = rays_from_triad(parameters.spin, fido, looking[block])
         fate[block], found[block] = trace_block(rays, parameters.tolerance, parameters.method)
-        yield min(block.stop, len(looking)) / len(looking)
+        yield block.stop / len(looking)
     to_world = np.array(parameters.hole_to_world)
     texture = np.empty((rows + 1, columns, 4), np.float32)
     texture[0] = _header(parameters, observer, heights)
