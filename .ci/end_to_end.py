@@ -20,10 +20,7 @@ from pathlib import Path
 import numpy as np
 from build_extension import build, current_platform
 
-from physics import read_warp_map
-from physics.images.exr import read_exr, write_exr
-from physics.light.star_sky import star_sky
-from physics.reference.reference_render import render
+from physics import read_exr, read_warp_map, render_reference, star_sky, write_exr
 
 SCENE_SCRIPT = Path(__file__).with_name("end_to_end_scene.py")
 SIZE = (160, 90)
@@ -84,7 +81,7 @@ def compare(folder: Path, sky: np.ndarray) -> None:
         sys.exit(f"Expected two maps and two pictures, found {maps} and {pictures}.")
     for number, (map_path, picture_path) in enumerate(zip(maps, pictures, strict=True), start=1):
         warp_map = read_warp_map(map_path)
-        expected = render(warp_map, sky, rotation=ROTATION, strength=STRENGTH).image[..., :3]
+        expected = render_reference(warp_map, sky, rotation=ROTATION, strength=STRENGTH).image[..., :3]
         picture = read_exr(picture_path)[0][..., :3]
         difference = np.abs(picture - expected)
         difference[BALL_REGION] = 0.0

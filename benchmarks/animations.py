@@ -17,7 +17,7 @@ import numpy as np
 from measuring import Row
 
 import physics
-from physics.numerics.work import drain
+from physics import drain
 
 SIZE = (1920, 1080)
 

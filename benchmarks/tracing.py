@@ -18,7 +18,7 @@ import numpy as np
 from measuring import Row
 
 import physics
-from physics.geodesics.tracer import METHODS
+from physics import METHODS
 
 SIZE = (1920, 1080)
 # The slow methods are measured on every fourth or sixteenth row of the picture.

@@ -24,10 +24,10 @@ def star_panorama(height: int, star_width: float, quality: int) -> bpy.types.Ima
     quality : int
         Of the compression, 0 to 100.
     """
-    from physics.light import star_sky
+    from physics import star_sky
 
     pixels = np.ones((height, 2 * height, 4), np.float32)
-    pixels[..., :3] = star_sky.star_sky(height, star_width=star_width)
+    pixels[..., :3] = star_sky(height, star_width=star_width)
     buffer = bpy.data.images.new("Pixels", 2 * height, height, float_buffer=True)
     buffer.colorspace_settings.name = "Linear Rec.709"
     buffer.pixels.foreach_set(pixels[::-1].ravel())
@@ -53,7 +53,7 @@ def sky_rotation(longitude: float, latitude: float, roll: float) -> Euler:
     longitude, latitude, roll : float
         Galactic coordinates, and the angle by which the Milky Way's band is turned in the picture; degrees.
     """
-    from physics.light.milky_way import galactic_axes
+    from physics import galactic_axes
 
     lon, lat = math.radians(longitude), math.radians(latitude)
     forward = Vector((math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)))

@@ -67,6 +67,7 @@ from .light.disk_texture import TURN_BETWEEN as DISK_PATTERN_TURN
 from .light.disk_texture import disk_texture
 from .light.disk_texture import pattern_period as disk_pattern_period
 from .light.disk_texture import pattern_shares as disk_pattern_shares
+from .light.milky_way import galactic_axes
 from .light.star_sky import star_sky
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
 from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
@@ -195,6 +196,7 @@ __all__ = [
     "drain",
     "ergosphere_radius",
     "find_pass",
+    "galactic_axes",
     "horizon_radius",
     "isco_radius",
     "looking_at_hole",

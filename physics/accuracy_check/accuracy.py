@@ -123,12 +123,28 @@ def accuracy_steps(
     environment_width: int = DEFAULT_ENVIRONMENT_WIDTH,
     seed: int = 0,
 ) -> Generator[float, None, AccuracyReport]:
-    """Do what `check_accuracy` does step by step: yields the fraction done after each block of rays.
+    """Trace sampled pixels of a baked map again, step by step.
+
+    Parameters
+    ----------
+    path, passes, samples, environment_width, seed
+        See `check_accuracy`.
+
+    Yields
+    ------
+    float
+        The fraction done, 0 to 1, after each block of rays.
+
+    Returns
+    -------
+    AccuracyReport
 
     Raises
     ------
+    WarpMapError
+        If the map or a pass is missing, damaged, or does not belong to the map.
     BlackHoleError
-        See `check_accuracy`.
+        If a number of samples or a width is out of range.
     """
     if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
         raise BlackHoleError(

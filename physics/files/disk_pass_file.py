@@ -153,12 +153,21 @@ def write_disk_pass(path: PathLike, disk_pass: DiskPass) -> None:
 
 
 def read_disk_pass(path: PathLike) -> DiskPass:
-    """Read a pass and check it: its format, its parameters, its pixels' checksum and ranges.
+    """Read a pass and check its format, its parameters, and the checksum and ranges of its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    DiskPass
+        float32 images of shape (height, width), row 0 at the top, and the metadata.
 
     Raises
     ------
     WarpMapError
-        When the file is missing, damaged, cut short, or not a disk pass; the message names it and says which.
+        If the file is missing, damaged, cut short, or not a disk pass; the message names it and says which.
     """
     (radius, phi, g, coverage), metadata = FORMAT.read(path)
     disk = metadata["parameters"].get("disk")

@@ -31,12 +31,18 @@ UNIT_TOLERANCE = 0.1
 
 
 def write_exit_map(path: PathLike, exit_map: ExitMap) -> None:
-    """Write an exit map to an EXR file, whole or not at all.
+    """Write an exit map to an EXR file, completely or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be; an existing file is replaced.
+    exit_map : ExitMap
 
     Raises
     ------
     ImageFileError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     upper = np.dstack([exit_map.direction, exit_map.one_plus_z])
     lower = np.dstack([exit_map.impact, exit_map.usable])
@@ -45,12 +51,20 @@ def write_exit_map(path: PathLike, exit_map: ExitMap) -> None:
 
 
 def read_exit_map(path: PathLike) -> ExitMap:
-    """Read an exit map and check it: its format, its parameters, its pixels' checksum and ranges.
+    """Read an exit map and check its format, its parameters, and the checksum and ranges of its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    ExitMap
 
     Raises
     ------
     WarpMapError
-        When the file is missing, damaged, cut short, or not an exit map; the message names it and says which.
+        If the file is missing, damaged, cut short, or not an exit map; the message names it and says which.
     """
     planes, metadata = FORMAT.read(path)
     pixels: NDArray[np.float32] = np.dstack(planes)
@@ -69,11 +83,20 @@ def read_exit_map(path: PathLike) -> ExitMap:
 
 
 def read_exit_map_metadata(path: PathLike) -> dict[str, Any]:
-    """Read an exit map's metadata from its header alone, without its pixels.
+    """Read an exit map's metadata from its header, without its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    dict
+        ``format``, ``hash``, ``counts`` and ``parameters``.
 
     Raises
     ------
     WarpMapError
-        When the file is missing, its header is damaged, or it is not an exit map.
+        If the file is missing, its header is damaged, or it is not an exit map.
     """
     return FORMAT.read_metadata(path)

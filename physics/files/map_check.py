@@ -29,9 +29,9 @@ class State(StrEnum):
     VALID = "valid"
     MISSING = "missing"
     STALE = "stale"
-    """Whole, but made from other settings or by another version."""
+    """Intact, but made from other settings or by another version."""
     FOREIGN = "foreign"
-    """Not one of ours, or of another kind."""
+    """Not a map, or a map of another kind."""
     DAMAGED = "damaged"
     """Cut short, or changed since it was written."""
 
@@ -42,7 +42,7 @@ class Finding:
 
     state: State
     fault: str = ""
-    """What is the matter, as the beginning of a sentence; empty if nothing is."""
+    """What is wrong, as the beginning of a sentence; empty if nothing is."""
 
 
 def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, thorough: bool = True) -> Finding:
@@ -56,12 +56,12 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
     wanted : str, optional
         The hash of the parameters that it should be made from; without it, any will do.
     thorough : bool
-        Read the pixels too (some 0.1 s in full HD) and check them; otherwise the header is taken at its word.
+        Whether to read and check the pixels too (some 0.1 s in full HD), and not only the header.
 
     Returns
     -------
     Finding
-        Nothing that is wrong with a file is raised.
+        What is wrong with a file is returned, never raised.
     """
     path = Path(path)
     noun = kind.noun.partition(" ")[2]
@@ -92,7 +92,18 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
 
 
 def stamp_kind(stamp: object) -> MapFormat | None:
-    """Return the format that a header's stamp belongs to, of whatever version; None if it is none of ours."""
+    """Return the format that a header's stamp belongs to, whatever its version.
+
+    Parameters
+    ----------
+    stamp : object
+        The value of the attribute `umbraFormat`, or anything else.
+
+    Returns
+    -------
+    MapFormat or None
+        None if it is not a map's stamp.
+    """
     if not isinstance(stamp, str):
         return None
     return next((kind for kind in READERS if stamp.startswith(kind.name + " ")), None)

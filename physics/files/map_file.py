@@ -51,14 +51,23 @@ class MapFormat:
         return f"{self.name} {self.version}"
 
     def write(self, path: PathLike, planes: Planes, metadata: Mapping[str, Any], further: Sequence[str] = ()) -> None:
-        """Write R, G, B and A, float32 of one shape each, with their header, whole or not at all.
+        """Write four planes with their header, completely or not at all.
 
-        `further` are the values of `attributes`.
+        Parameters
+        ----------
+        path : path
+            Its folder is made if need be; an existing file is replaced.
+        planes : sequence of ndarray of float32
+            R, G, B and A, of one shape each.
+        metadata : mapping
+            ``hash``, ``counts`` and ``parameters``.
+        further : sequence of str
+            The values of `attributes`.
 
         Raises
         ------
         ImageFileError
-            When the file cannot be written.
+            If the file cannot be written.
         """
         write_channels(
             path,
@@ -75,12 +84,23 @@ class MapFormat:
         )
 
     def read(self, path: PathLike) -> tuple[list[NDArray[Any]], dict[str, Any]]:
-        """Read the four channels and the metadata, further attributes included; header and checksum are checked.
+        """Read the four planes and the metadata, and check header and checksum.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        planes : list of ndarray
+            R, G, B and A.
+        metadata : dict
+            ``format``, ``hash``, ``counts`` and ``parameters``, and the further attributes.
 
         Raises
         ------
         WarpMapError
-            When the file is missing, damaged, cut short, or of another kind; the message names it and says which.
+            If the file is missing, damaged, cut short, or of another kind; the message names it and says which.
         """
         try:
             channels, header = read_channels(path)
@@ -93,12 +113,21 @@ class MapFormat:
         return planes, metadata
 
     def read_metadata(self, path: PathLike) -> dict[str, Any]:
-        """Read the metadata from the header alone.
+        """Read the metadata from the header.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        dict
+            As from `read`.
 
         Raises
         ------
         WarpMapError
-            When the file is missing, its header is damaged, or it is of another kind.
+            If the file is missing, its header is damaged, or it is of another kind.
         """
         try:
             header = read_exr_header(path)
@@ -129,7 +158,18 @@ class MapFormat:
 
 
 def checksum(planes: Planes) -> str:
-    """Return the CRC-32 of the channels' bytes, one after another."""
+    """Return the CRC-32 of the channels' bytes, one after another.
+
+    Parameters
+    ----------
+    planes : sequence of ndarray
+        Taken as little-endian float32.
+
+    Returns
+    -------
+    str
+        ``crc32`` and eight hexadecimal digits.
+    """
     value = 0
     for plane in planes:
         value = zlib.crc32(np.ascontiguousarray(plane, dtype="<f4").data, value)
@@ -137,5 +177,5 @@ def checksum(planes: Planes) -> str:
 
 
 def advice(sentence: str) -> str:
-    """Return what a reader of a faulty file is told."""
+    """Return a sentence about a faulty file with the advice to bake it again."""
     return f"{sentence.removesuffix('.')}; bake it again."

@@ -43,17 +43,21 @@ def write_warp_map(path: PathLike, warp_map: WarpMap) -> None:
 
 
 def read_warp_map(path: PathLike) -> WarpMap:
-    """Read a warp map and check it: its format, its parameters, its pixels' checksum and ranges.
+    """Read a warp map and check its format, its parameters, and the checksum and ranges of its pixels.
+
+    Parameters
+    ----------
+    path : path
 
     Returns
     -------
     WarpMap
-        As it was written: float32 images of shape (height, width), row 0 at the top, and the metadata.
+        float32 images of shape (height, width), row 0 at the top, and the metadata.
 
     Raises
     ------
     WarpMapError
-        When the file is missing, damaged, cut short, or not a warp map; the message names it and says which.
+        If the file is missing, damaged, cut short, or not a warp map; the message names it and says which.
     """
     (theta, phi, one_plus_z, visibility), metadata = FORMAT.read(path)
     _check_ranges(path, theta, phi, one_plus_z, visibility)
@@ -61,12 +65,21 @@ def read_warp_map(path: PathLike) -> WarpMap:
 
 
 def read_warp_map_metadata(path: PathLike) -> dict[str, Any]:
-    """Read a warp map's metadata from its header alone, without its pixels.
+    """Read a warp map's metadata from its header, without its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    dict
+        ``format``, ``hash``, ``counts`` and ``parameters``.
 
     Raises
     ------
     WarpMapError
-        When the file is missing, its header is damaged, or it is not a warp map.
+        If the file is missing, its header is damaged, or it is not a warp map.
     """
     return FORMAT.read_metadata(path)
 

@@ -26,24 +26,38 @@ UNIT_TOLERANCE = 1e-4
 
 
 def write_world_map(path: PathLike, world_map: WorldMap) -> None:
-    """Write a world map to an EXR file, whole or not at all.
+    """Write a world map to an EXR file, completely or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be; an existing file is replaced.
+    world_map : WorldMap
 
     Raises
     ------
     ImageFileError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     downwards = world_map.texture[::-1]
     FORMAT.write(path, [np.ascontiguousarray(downwards[..., i]) for i in range(4)], world_map.metadata)
 
 
 def read_world_map(path: PathLike) -> WorldMap:
-    """Read a world map and check it: its format, its parameters, its pixels' checksum and ranges.
+    """Read a world map and check its format, its parameters, and the checksum and ranges of its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    WorldMap
 
     Raises
     ------
     WarpMapError
-        When the file is missing, damaged, cut short, or not a world map; the message names it and says which.
+        If the file is missing, damaged, cut short, or not a world map; the message names it and says which.
     """
     planes, metadata = FORMAT.read(path)
     texture: NDArray[np.float32] = np.ascontiguousarray(np.dstack(planes)[::-1])
@@ -61,11 +75,20 @@ def read_world_map(path: PathLike) -> WorldMap:
 
 
 def read_world_map_metadata(path: PathLike) -> dict[str, Any]:
-    """Read a world map's metadata from its header alone, without its pixels.
+    """Read a world map's metadata from its header, without its pixels.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    dict
+        ``format``, ``hash``, ``counts`` and ``parameters``.
 
     Raises
     ------
     WarpMapError
-        When the file is missing, its header is damaged, or it is not a world map.
+        If the file is missing, its header is damaged, or it is not a world map.
     """
     return FORMAT.read_metadata(path)

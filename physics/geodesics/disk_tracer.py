@@ -159,7 +159,20 @@ def trace_disk(
 
 
 def check_disk_settings(crossings: int, method: str) -> None:
-    """Raise BlackHoleError for a number of crossings or a method that cannot be used for a disk."""
+    """Check the settings of tracing to the disk.
+
+    Parameters
+    ----------
+    crossings : int
+        1 to `MOST_CROSSINGS`.
+    method : str
+        A name in `DISK_METHODS`.
+
+    Raises
+    ------
+    BlackHoleError
+        If the number is out of range, or the method knows no disk.
+    """
     crossings = whole(crossings, "the number of crossings")
     if not 1 <= crossings <= MOST_CROSSINGS:
         raise BlackHoleError(f"The number of crossings is {crossings}; give it a value between 1 and {MOST_CROSSINGS}.")

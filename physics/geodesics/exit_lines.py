@@ -73,7 +73,18 @@ def exit_lines(rays: Rays, tolerance: float, method: str = QUADRATURE) -> tuple[
 
 
 def check_exit_method(method: str) -> None:
-    """Raise BlackHoleError for a method that cannot tell where rays leave."""
+    """Check that a method can trace exit lines.
+
+    Parameters
+    ----------
+    method : str
+        A name in `tracer.METHODS`.
+
+    Raises
+    ------
+    BlackHoleError
+        If it cannot.
+    """
     if method not in EXIT_METHODS:
         raise BlackHoleError(
             f"The method '{method}' gives directions alone and cannot tell where rays leave: choose one of "

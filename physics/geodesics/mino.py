@@ -58,7 +58,19 @@ BRACKETED_ROUNDS = 60
 
 
 def radial_polynomial(rays: Rays) -> tuple[Array, Array, Array]:
-    """Return the coefficients c_2, c_3, c_4 of U(u) = 1 + c_2 u^2 + c_3 u^3 + c_4 u^4, each of shape (n,)."""
+    """Return the coefficients of U, the radial potential of Eq. 3 in u = 1 / r.
+
+    U = (du / dlambda)^2 = 1 + c_2 u^2 + c_3 u^3 + c_4 u^4.
+
+    Parameters
+    ----------
+    rays : Rays
+
+    Returns
+    -------
+    c2, c3, c4 : ndarray, shape (n,)
+        Units of M^2, M^3 and M^4.
+    """
     a = rays.spin
     c2 = a * a - rays.q_plus_b2
     c3 = 2.0 * (rays.q_plus_b2 + a * a - 2.0 * a * rays.b)

@@ -171,7 +171,20 @@ class RadialPath:
 
 
 def winding(spin: float, u: NDArray[Any]) -> NDArray[Any]:
-    """Return W(u), what the azimuth of a ray winds up by on its way into the horizon, for u < 1 / r_+."""
+    """Return W(u), by which the azimuth of a ray winds up on its way to the horizon.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    u : ndarray
+        1 / r < 1 / r_+, units of 1 / M.
+
+    Returns
+    -------
+    ndarray
+        Radians; the shape of `u`.
+    """
     inner = spin * spin / horizon_radius(spin)
     between = 2.0 * math.sqrt((1.0 - spin) * (1.0 + spin))  # r_+ - r_-, with its digits for the fastest holes
     wound: NDArray[Any] = np.log1p(-between * u / (1.0 - inner * u))

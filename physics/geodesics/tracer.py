@@ -72,7 +72,21 @@ Systems = Callable[[Rays, Barrier, float], list[tuple[NDArray[np.intp], System]]
 
 
 def mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
-    """Return the regularised equations of motion for these rays."""
+    """Return the regularized equations of motion in Mino time for rays from the sky.
+
+    Parameters
+    ----------
+    rays : Rays
+    barrier : Barrier
+        Of these rays.
+    tolerance : float
+        Radians.
+
+    Returns
+    -------
+    list of (ndarray of int, System)
+        The rays that the barrier turns back, and the others: their indices and their system.
+    """
     turning = np.flatnonzero(barrier.blocks)
     direct = np.flatnonzero(~barrier.blocks)
     return [
@@ -82,12 +96,23 @@ def mino_systems(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[N
 
 
 def printed_system(rays: Rays, barrier: Barrier, tolerance: float) -> list[tuple[NDArray[np.intp], System]]:
-    """Return Eq. 2 as printed for these rays."""
+    """Return Eq. 2 as printed for rays from the sky; parameters and result as for `mino_systems`."""
     return [(np.arange(len(rays)), PrintedSystem(rays, barrier, tolerance))]
 
 
 def stepping(tableau: Tableau, systems: Systems) -> Tracer:
-    """Return the tracer that integrates some equations of motion step by step with a Runge-Kutta pair."""
+    """Return a tracer that integrates equations of motion step by step with a Runge-Kutta pair.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    systems : callable
+        See `Systems`.
+
+    Returns
+    -------
+    Tracer
+    """
 
     def trace(rays: Rays, barrier: Barrier, tolerance: float, max_steps: int) -> tuple[Array, NDArray[np.bool_]]:
         direction = np.full((len(rays), 3), np.nan)
@@ -239,13 +264,21 @@ def trace_rays(
 def trace_block(
     rays: Rays, tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Trace one block of rays, all at once; for settings see `trace_rays`.
+    """Trace one block of rays, all at once.
+
+    Parameters
+    ----------
+    rays : Rays
+        n rays of one camera.
+    tolerance, method, max_steps
+        See `trace_rays`; not checked.
 
     Returns
     -------
     fate : ndarray of uint8, shape (n,)
+        Values of `Fate`.
     direction : ndarray, shape (n, 3)
-        Unit vector towards the origin of the light, in the hole's frame; NaN unless SKY.
+        Unit vectors toward the origin of the light, in the hole's frame; NaN unless SKY.
     """
     barrier = find_barrier(rays)
     sky = indices(comes_from_sky(rays, barrier))
@@ -258,7 +291,23 @@ def trace_block(
 
 
 def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array]:
-    """Return viewing directions broadcast against each other, or raise BlackHoleError for what cannot be one."""
+    """Return viewing directions broadcast against each other.
+
+    Parameters
+    ----------
+    theta_rd, phi_rd : array_like
+        Radians; shapes that broadcast.
+
+    Returns
+    -------
+    theta, phi : ndarray
+        Of the broadcast shape.
+
+    Raises
+    ------
+    BlackHoleError
+        If they are not finite numbers, or their shapes do not broadcast.
+    """
     try:
         theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
     except (TypeError, ValueError, OverflowError) as error:
@@ -269,7 +318,18 @@ def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array
 
 
 def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_STEPS) -> None:
-    """Raise BlackHoleError for a tolerance, method or number of steps that cannot be used."""
+    """Check the settings of tracing.
+
+    Parameters
+    ----------
+    tolerance, method, max_steps
+        See `trace_rays`.
+
+    Raises
+    ------
+    BlackHoleError
+        If the tolerance is out of range, there is no such method, or there are no steps.
+    """
     tolerance, max_steps = number(tolerance, "the tolerance"), whole(max_steps, "the number of steps")
     if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
         raise BlackHoleError(
@@ -283,7 +343,17 @@ def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_S
 
 
 def last(rounds: Iterator[Integration | None]) -> Integration:
-    """Return the outcome of an integration."""
+    """Return the outcome of an integration.
+
+    Parameters
+    ----------
+    rounds : iterator
+        From `integrate`.
+
+    Returns
+    -------
+    Integration
+    """
     for outcome in rounds:
         if outcome is not None:
             return outcome

@@ -83,12 +83,22 @@ def _library_threads() -> Iterator[None]:
 def replacing(path: PathLike) -> Iterator[Path]:
     """Yield a temporary path beside `path` that takes its place when the block ends without an error.
 
-    A reader, or a crash, meets the old file or the new one whole, never a half.
+    A reader, or a crash, meets either the old file or the complete new one. Use it in a `with` statement.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be.
+
+    Yields
+    ------
+    Path
+        Where to write; see `target_of` for its name.
 
     Raises
     ------
     ImageFileError
-        When the folder cannot be made or written, or the disk is full.
+        If the folder cannot be made or written, or the disk is full.
     """
     target = Path(path)
     try:
@@ -114,7 +124,18 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def target_of(name: str) -> str | None:
-    """Return the name of the file that a temporary one of `replacing` was to become; None for any other name."""
+    """Return the name of the file that a temporary file is written for.
+
+    Parameters
+    ----------
+    name : str
+        A file's name, without its folder.
+
+    Returns
+    -------
+    str or None
+        None if it is not the name of a temporary file of `replacing`.
+    """
     match = _TEMPORARY.fullmatch(name)
     return None if match is None else match[1] + match[2]
 
@@ -168,14 +189,23 @@ def write_channels(
 
 
 def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Read an EXR file's R, G, B(, A) as float32, shape (height, width, 3 or 4), row 0 at the top, and its header.
+    """Read an EXR picture and its header.
 
-    Luminance-only files are read as gray.
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    pixels : ndarray of float32, shape (height, width, 3 or 4)
+        R, G, B(, A), row 0 at the top. Files with luminance only are read as gray.
+    header : dict
+        As from `read_exr_header`.
 
     Raises
     ------
     ImageFileError
-        When the file is missing, damaged or holds no picture.
+        If the file is missing, damaged, or has no picture.
     """
     channels, header = read_channels(path)
     if "Y" in channels and "R" not in channels:
@@ -199,12 +229,21 @@ def read_channels(path: PathLike) -> tuple[dict[str, NDArray[Any]], dict[str, An
 
 
 def read_exr_header(path: PathLike) -> dict[str, Any]:
-    """Read an EXR file's header alone: attributes by name, with ``size`` as (width, height).
+    """Read an EXR file's header.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    dict
+        Attributes by name, with ``size`` as (width, height).
 
     Raises
     ------
     ImageFileError
-        When the file is missing or its header is damaged.
+        If the file is missing or its header is damaged.
     """
     with _opened(path, header_only=True) as file:
         return _attributes(file)

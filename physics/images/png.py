@@ -14,7 +14,17 @@ from .exr import PathLike, replacing
 
 
 def srgb_from_linear(linear: ArrayLike) -> NDArray[np.uint8]:
-    """Return linear Rec.709 values as 8-bit sRGB (IEC 61966-2-1), clipped; any shape."""
+    """Return 8-bit sRGB values of linear Rec. 709 values, clipped to [0, 1] (IEC 61966-2-1).
+
+    Parameters
+    ----------
+    linear : array_like
+
+    Returns
+    -------
+    ndarray of uint8
+        Of the same shape.
+    """
     value = np.clip(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0, 1.0)
     encoded = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1.0 / 2.4) - 0.055)
     levels: NDArray[np.uint8] = np.round(encoded * 255.0).astype(np.uint8)
@@ -22,12 +32,19 @@ def srgb_from_linear(linear: ArrayLike) -> NDArray[np.uint8]:
 
 
 def write_png(path: PathLike, linear: ArrayLike) -> None:
-    """Write linear Rec.709 values, shape (height, width, 3 or 4; alpha ignored), as an sRGB PNG, whole or not at all.
+    """Write a picture as an 8-bit sRGB PNG, completely or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is made if need be.
+    linear : array_like, shape (height, width, 3 or 4)
+        Linear Rec. 709, row 0 at the top. Alpha is ignored.
 
     Raises
     ------
     ImageFileError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     pixels = srgb_from_linear(np.asarray(linear)[:, :, :3])
     height, width = pixels.shape[:2]

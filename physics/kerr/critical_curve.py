@@ -66,7 +66,18 @@ class Barrier:
 
 
 def find_barrier(rays: Rays) -> Barrier:
-    """Return the outermost minimum of Eq. 3's R for each ray, in closed form."""
+    """Return the outermost minimum of Eq. 3's R for each ray, in closed form.
+
+    Parameters
+    ----------
+    rays : Rays
+        n rays of one camera.
+
+    Returns
+    -------
+    Barrier
+        Arrays of shape (n,).
+    """
     a, r_cam = rays.spin, rays.observer.r
     linear = 0.5 * (a * a - rays.q_plus_b2)  # A
     constant = 0.5 * (rays.q_plus_b2 + a * a - 2.0 * a * rays.b)  # C
@@ -97,9 +108,19 @@ def find_barrier(rays: Rays) -> Barrier:
 
 
 def comes_from_sky(rays: Rays, barrier: Barrier | None = None) -> NDArray[np.bool_]:
-    """Return which rays come from the sky (Eqs. 11, 12 in closed form), shape (n,).
+    """Return which rays come from the sky (Eqs. 11, 12 in closed form); the others come from the hole.
 
     Rays of no or negative energy at infinity, which occur inside the ergosphere, come from the horizon.
+
+    Parameters
+    ----------
+    rays : Rays
+    barrier : Barrier, optional
+        Of these rays, if it is known.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
     barrier = find_barrier(rays) if barrier is None else barrier
     unobstructed = rays.radial < 0.0
@@ -130,13 +151,35 @@ def edge_function(rays: Rays) -> Array:
 
 
 def all_around(count: int) -> tuple[Array, Array]:
-    """Return cosine and sine of so many position angles at equal steps, for `around_hole`, shape (count,)."""
+    """Return cosine and sine of position angles at equal steps, for `around_hole`.
+
+    Parameters
+    ----------
+    count : int
+        Number of angles; the first is 0.
+
+    Returns
+    -------
+    aside, up : ndarray, shape (count,)
+    """
     return cos_sin(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False, dtype=np.float64))
 
 
 def around_hole(away: Array, aside: Array, up: Array) -> Array:
-    """Return unit vectors on a FIDO's triad, shape (..., 3), at angles from the hole's direction, in radians, towards
-    position angles with cosine `aside` (theta-hat) and sine `up` (phi-hat)."""
+    """Return directions in a FIDO's sky at given angles from the hole's direction.
+
+    Parameters
+    ----------
+    away : ndarray
+        Angles from the hole's direction, radians.
+    aside, up : ndarray
+        Cosine (along theta-hat) and sine (along phi-hat) of the position angles; shapes that broadcast with `away`.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Unit vectors along which the FIDO looks, on (r-hat, theta-hat, phi-hat).
+    """
     cosine, sine = cos_sin(away)
     return by_component(-cosine, sine * aside, sine * up)
 
@@ -166,12 +209,29 @@ def position_angles(light: Array) -> tuple[Array, Array]:
 def edge_angles(
     spin: float, fido: Observer, aside: Array, up: Array, error: float, about: tuple[Array, float] | None = None
 ) -> Array:
-    """Return the angles from the hole's direction to the shadow's edge in a FIDO's sky, radians, by bisection.
+    """Return the angles from the hole's direction to the shadow's edge in a FIDO's sky, by bisection.
 
     The shadow surrounds the hole's direction, and each great circle from there to the opposite point, which is sky,
-    crosses its edge once. The answer lies on the sky's side, within `error` radians; for `aside` and `up` see
-    `around_hole`. `about`: where the edge is looked for first, if that is known, and how far on both sides. So near
-    to it the edge function is nearly a straight line, which then says at once where the edge is to `error`.
+    crosses its edge once.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    fido : Observer
+        From `Observer.fido`, outside the horizon.
+    aside, up : ndarray, shape (n,)
+        Cosine and sine of position angles, see `around_hole`.
+    error : float
+        Radians, > 0.
+    about : (ndarray, float), optional
+        Where the edge is looked for first, radians, shape (n,), and how far on both sides. So near to it the edge
+        function is nearly a straight line, which tells at once where the edge is to within `error`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Radians, (0, pi): on the sky's side of the edge, within `error` of it.
     """
 
     def height(*away: Array) -> Array:
@@ -238,16 +298,47 @@ def spherical_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
 
 
 def spherical_orbit_radii(spin: float) -> tuple[float, float]:
-    """Return r_1 and r_2, the radii of the prograde and retrograde circular photon orbits (Eq. 10)."""
+    """Return the range of the radii of spherical photon orbits (Eq. 10).
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+
+    Returns
+    -------
+    r_1, r_2 : float
+        Radii of the prograde and the retrograde circular photon orbit, units of M.
+
+    Raises
+    ------
+    BlackHoleError
+        If the spin is out of range.
+    """
     a = check_spin(spin)
     return circular_photon_radius(a), circular_photon_radius(-a)
 
 
 def critical_impact_parameters(spin: float) -> tuple[float, float]:
-    """Return b_1 = b0(r_2) < b_2 = b0(r_1), the ends of the range of Eq. 11, in closed form.
+    """Return the range of impact parameters on the critical curve, in closed form (the ends of Eq. 11).
 
-    b0(r_1) = -a + 6 cos(arccos(-a)/3), b0(r_2) = -a - 6 cos(arccos(a)/3): good at spin 0 as well, where
-    Eq. 9 is not. (BPT's radii of Eq. 10 put into Eq. 9 and simplified.)
+    b0(r_1) = -a + 6 cos(arccos(-a)/3), b0(r_2) = -a - 6 cos(arccos(a)/3): good at spin 0 as well, where Eq. 9 is
+    not. (BPT's radii of Eq. 10 put into Eq. 9 and simplified.)
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+
+    Returns
+    -------
+    b_1, b_2 : float
+        b0(r_2) < b0(r_1), units of M.
+
+    Raises
+    ------
+    BlackHoleError
+        If the spin is out of range.
     """
     a = check_spin(spin)
     return -a - 6.0 * math.cos(math.acos(a) / 3.0), -a + 6.0 * math.cos(math.acos(-a) / 3.0)

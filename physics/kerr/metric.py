@@ -95,42 +95,105 @@ def metric_functions(spin: float, r: float, theta: float) -> MetricFunctions:
 
 
 def axis_safe_sin(theta: float) -> float:
-    """Return sin(theta), exactly 0 at the float nearest to pi, where `math.sin` leaves 1.2e-16."""
+    """Return sin(theta), exactly 0 at the float nearest to pi, where `math.sin` gives 1.2e-16.
+
+    Parameters
+    ----------
+    theta : float
+        Polar angle, radians, [0, pi].
+
+    Returns
+    -------
+    float
+    """
     return 0.0 if theta == math.pi else math.sin(theta)
 
 
 def horizon_radius(spin: float) -> float:
-    """Return the radius r_+ of the outer event horizon, in units of M (BPT Eq. 2.6); `spin` within (-1, 1)."""
+    """Return the radius of the outer event horizon, r_+ = 1 + sqrt(1 - a^2) (BPT Eq. 2.6).
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1; not checked.
+
+    Returns
+    -------
+    float
+        Units of M, from 1 to 2.
+    """
     return 1.0 + math.sqrt((1.0 - spin) * (1.0 + spin))
 
 
 def ergosphere_radius(spin: float, theta: float) -> float:
-    """Return the radius inside which nothing can be at rest against the stars, in units of M.
+    """Return the radius inside which nothing can be at rest relative to the stars.
 
-    Where g_tt = 0: r = 1 + sqrt(1 - a^2 cos^2 theta) (BPT Eq. 2.7). `spin` within (-1, 1), `theta` in radians,
-    [0, pi].
+    It is where g_tt = 0: r = 1 + sqrt(1 - a^2 cos^2 theta) (BPT Eq. 2.7).
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1; not checked.
+    theta : float
+        Polar angle, radians, [0, pi].
+
+    Returns
+    -------
+    float
+        Units of M, from 1 to 2.
     """
     a_cos = spin * math.cos(theta)
     return 1.0 + math.sqrt((1.0 - a_cos) * (1.0 + a_cos))
 
 
 def photon_orbit_radius(spin: float, prograde: bool = True) -> float:
-    """Return the radius of the equatorial circular photon orbit, in units of M (Eq. 10; BPT Eq. 2.18).
+    """Return the radius of the equatorial circular photon orbit (Eq. 10; BPT Eq. 2.18).
 
-    `spin` within (-1, 1); `prograde` means turning with the hole, whichever way that is.
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1; not checked.
+    prograde : bool
+        Whether the light orbits with the hole's rotation, whatever the sign of the spin.
+
+    Returns
+    -------
+    float
+        Units of M, from 1 to 4.
     """
     return circular_photon_radius(abs(spin) if prograde else -abs(spin))
 
 
 def circular_photon_radius(spin: float) -> float:
-    """Return r_1 of Eq. 10, of light that circles towards +phi; r_2 is that of the opposite spin; in units of M."""
+    """Return the radius of the circular photon orbit toward +phi, r_1 of Eq. 10 (BPT Eq. 2.18).
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1; not checked. Of the opposite spin, the radius is that of the orbit toward -phi, r_2.
+
+    Returns
+    -------
+    float
+        Units of M, from 1 to 4.
+    """
     return 2.0 * (1.0 + math.cos(2.0 / 3.0 * math.acos(-spin)))
 
 
 def isco_radius(spin: float, prograde: bool = True) -> float:
-    """Return the radius of the innermost stable circular orbit, in units of M (BPT Eq. 2.21).
+    """Return the radius of the innermost stable circular orbit, the ISCO (BPT Eq. 2.21).
 
-    `spin` within (-1, 1); `prograde` means turning with the hole, whichever way that is.
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1; not checked.
+    prograde : bool
+        Whether the matter orbits with the hole's rotation, whatever the sign of the spin.
+
+    Returns
+    -------
+    float
+        Units of M, from 1 to 9.
     """
     a = abs(spin)
     z1 = 1.0 + ((1.0 - a) * (1.0 + a)) ** (1.0 / 3.0) * ((1.0 + a) ** (1.0 / 3.0) + (1.0 - a) ** (1.0 / 3.0))

@@ -20,7 +20,20 @@ from .metric import check_spin, horizon_radius, isco_radius
 
 
 def matter_direction(spin: float, retrograde: bool = False) -> float:
-    """Return 1 for matter that turns towards +phi, -1 towards -phi: with the hole, or towards +phi without spin."""
+    """Return the direction in which the matter of a disk orbits.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    retrograde : bool
+        Whether the matter orbits against the hole's rotation.
+
+    Returns
+    -------
+    float
+        1 toward +phi, -1 toward -phi. Around a hole without spin, matter that is not retrograde orbits toward +phi.
+    """
     with_hole = -1.0 if spin < 0.0 else 1.0
     return -with_hole if retrograde else with_hole
 
@@ -89,9 +102,25 @@ def redshift_factor(
 def circular_redshift(
     spin: float, u: NDArray[Any], b: NDArray[Any], energy: NDArray[Any], retrograde: bool = False
 ) -> NDArray[Any]:
-    """Return what `redshift_factor` does for matter on circular geodesics at 1 / r = `u`, in the precision of `u`.
+    """Return g for matter on circular geodesics outside the ISCO, in the precision of `u`.
 
     -p . u = u^t (E - Omega L) with u^t from BPT Eqs. 2.12 and 2.16, multiplied out.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    u : ndarray
+        1 / r of the matter, units of 1 / M.
+    b, energy : ndarray
+        p_phi and -p_t of the light, units of M and 1, as for `redshift_factor`.
+    retrograde : bool
+        Whether the matter orbits against the hole's rotation.
+
+    Returns
+    -------
+    ndarray
+        1 / (-p . u), of the broadcast shape.
     """
     direction = matter_direction(spin, retrograde)
     a = direction * spin
@@ -116,7 +145,22 @@ def _falling(a: float, r: Array, b: Array, energy: Array, radial: Array, isco: f
 
 
 def circular_constants(a: float, r: float) -> tuple[float, float]:
-    """Return energy and angular momentum per mass of the circular orbit towards +phi (BPT Eqs. 2.12, 2.13)."""
+    """Return energy and angular momentum per mass of the circular orbit toward +phi (BPT Eqs. 2.12, 2.13).
+
+    Parameters
+    ----------
+    a : float
+        Kerr parameter, -1 < a < 1; negative for an orbit against the hole's rotation.
+    r : float
+        Units of M, outside the photon orbit.
+
+    Returns
+    -------
+    energy : float
+        E per mass.
+    momentum : float
+        L per mass, units of M.
+    """
     root = math.sqrt(r)
     below = r**0.75 * math.sqrt(r * root - 3.0 * root + 2.0 * a)
     return (r * root - 2.0 * root + a) / below, (r * r - 2.0 * a * root + a * a) / below

@@ -72,15 +72,33 @@ class Rays:
 
 
 def camera_directions(theta_rd: ArrayLike, phi_rd: ArrayLike) -> Array:
-    """Return the unit vectors N of Eq. 4, shape (n, 3), for viewing angles in radians, shape (n,) each."""
+    """Return the unit vectors N of Eq. 4 along which a camera looks.
+
+    Parameters
+    ----------
+    theta_rd, phi_rd : array_like, shape (n,)
+        Viewing angles in the camera's frame, radians.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        On (e_x, e_y, e_z), e_y along the camera's motion.
+    """
     return unit_vectors(theta_rd, phi_rd)
 
 
 def camera_triad(observer: Observer) -> Array:
-    """Return the camera's axes in the FIDO's triad: row i is e_x, e_y, e_z along (r, theta, phi)-hat.
+    """Return the camera's axes on the FIDO's triad: the inverse of Eq. 6, corrected.
 
-    The inverse of Eq. 6 corrected. Along B = +-theta-hat, where kappa = 0, e_x = r-hat and
-    e_z = e_x x e_y.
+    Parameters
+    ----------
+    observer : Observer
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows e_x, e_y and e_z along (r, theta, phi)-hat. Where the motion B is along +-theta-hat, kappa = 0, and e_x is
+        r-hat and e_z = e_x x e_y.
     """
     b_r, b_theta, b_phi = observer.direction
     kappa = math.hypot(b_r, b_phi)
@@ -115,19 +133,53 @@ def rays_from_camera(spin: float, observer: Observer, directions: Array) -> Rays
 
 
 def rays_from_triad(spin: float, observer: Observer, looking: Array) -> Rays:
-    """Return the rays that a camera sees along `looking`, given on the axes (r-hat, theta-hat, phi-hat).
+    """Return the rays that a camera sees along directions on the axes (r-hat, theta-hat, phi-hat).
 
-    The same as `rays_from_camera` with N expressed not on (e_x, e_y, e_z) but on the FIDO's triad carried
-    along by the boost to the camera; shape (n, 3).
+    These axes are the FIDO's triad, carried along by the boost to the camera.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    observer : Observer
+        The camera, outside the horizon.
+    looking : ndarray, shape (n, 3)
+        Unit vectors along which the camera looks. Light runs the other way.
+
+    Returns
+    -------
+    Rays
+
+    Raises
+    ------
+    BlackHoleError
+        If the spin is out of range or the camera is inside the horizon.
     """
     return rays_from_axes(spin, observer, looking, np.eye(3))
 
 
 def rays_from_axes(spin: float, observer: Observer, directions: Array, axes: Array) -> Rays:
-    """Return the rays that a camera sees along `directions`, given on any axes of its own.
+    """Return the rays that a camera sees along directions on any axes of its own.
 
-    The same as `rays_from_camera`, with each row of `axes`, shape (3, 3), one axis of the camera's frame on
-    the FIDO's triad carried along by the boost.
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    observer : Observer
+        The camera, outside the horizon.
+    directions : ndarray, shape (n, 3)
+        Unit vectors along which the camera looks. Light runs the other way.
+    axes : ndarray, shape (3, 3)
+        Each row is one axis of the camera's frame on (r, theta, phi)-hat, the FIDO's triad carried along by the boost.
+
+    Returns
+    -------
+    Rays
+
+    Raises
+    ------
+    BlackHoleError
+        If the spin is out of range or the camera is inside the horizon.
     """
     spin = check_spin(spin)
     metric = metric_functions(spin, observer.r, observer.theta)
@@ -166,21 +218,30 @@ def light_in_fido_frame(observer: Observer, directions: Array, axes: Array) -> t
 
 
 def negative_energy_rays(spin: float, observer: Observer, directions: Array) -> Rays:
-    """Return the rays along `directions` that carry negative energy at infinity, as ordinary rays of a mirrored hole.
+    """Return the rays that carry negative energy at infinity, as ordinary rays of a mirrored hole.
 
     Reversing the energy and the spin together leaves r and theta of Eq. 2 as they are and reverses d phi / d zeta: such
     a ray, traced backwards, runs as one of unit energy and the same b / |E| does about the hole of spin -a.
 
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    observer : Observer
+        The camera, outside the horizon.
+    directions : ndarray, shape (n, 3)
+        Unit vectors N in the camera frame (Eq. 4): where the camera looks.
+
     Returns
     -------
     Rays
-        Of spin -a and scaled to p_t = +1; `escapes` says which directions these are, and `one_plus_z` holds
-        -E / E_camera. Rays without any energy count as having the least.
+        Of spin -a and scaled to p_t = +1; `escapes` says which directions these are, and `one_plus_z` is
+        -E / E_camera. Rays of no energy count as having the least.
 
     Raises
     ------
     BlackHoleError
-        As for `rays_from_camera`.
+        If the spin is out of range or the camera is inside the horizon.
     """
     spin = check_spin(spin)
     metric = metric_functions(spin, observer.r, observer.theta)
@@ -189,10 +250,29 @@ def negative_energy_rays(spin: float, observer: Observer, directions: Array) -> 
 
 
 def redshift_vector(spin: float, observer: Observer) -> tuple[float, Array]:
-    """Return c_0 and c, shape (3,), with 1 + z = c_0 + c . N for every ray of the camera, N on (r, theta, phi)-hat.
+    """Return the constants with which 1 + z of the sky is a linear function of the direction.
 
     Eqs. 5, 7 and 13 put together: the Doppler factor times alpha + omega varpi n_phi, in which the denominator of
     Eq. 5 cancels.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    observer : Observer
+        The camera, outside the horizon.
+
+    Returns
+    -------
+    constant : float
+        c_0.
+    vector : ndarray, shape (3,)
+        c, with 1 + z = c_0 + c . N for every ray of the camera, N on (r, theta, phi)-hat.
+
+    Raises
+    ------
+    BlackHoleError
+        If the spin is out of range or the camera is inside the horizon.
     """
     metric = metric_functions(spin, observer.r, observer.theta)
     e_x, e_y, e_z = camera_triad(observer)

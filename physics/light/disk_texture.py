@@ -52,9 +52,21 @@ CLUMPS = Pattern(across=7.0, down=5.0, slope=2.6)
 
 
 def random_picture(pattern: Pattern, seed: int, width: int = TEXTURE_WIDTH, height: int = TEXTURE_HEIGHT) -> Array:
-    """Return a picture of values spread evenly over 0 to 1, shape (height, width), that repeats in both directions.
+    """Return a random picture of values spread evenly over 0 to 1 that repeats in both directions.
 
-    A Gaussian random field of the given spectrum, by Fourier transformation, brought to an even distribution.
+    A Gaussian random field of the given spectrum, by Fourier transformation, mapped to an even distribution.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        The spectrum.
+    seed : int
+    width, height : int
+        Texels.
+
+    Returns
+    -------
+    ndarray, shape (height, width)
     """
     random = np.random.default_rng(seed)
     m = np.fft.rfftfreq(width, 1.0 / width)
@@ -69,7 +81,20 @@ def random_picture(pattern: Pattern, seed: int, width: int = TEXTURE_WIDTH, heig
 
 
 def disk_texture(seed: int = 1, width: int = TEXTURE_WIDTH, height: int = TEXTURE_HEIGHT) -> Array:
-    """Return streaks and clumps, shape (height, width, 2), 0 to 1; row 0 at the inner rim, column 0 at azimuth 0."""
+    """Return a texture of streaks and clumps.
+
+    Parameters
+    ----------
+    seed : int
+        Another seed makes another texture.
+    width, height : int
+        Texels around the disk and across it.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 2)
+        Streaks and clumps, 0 to 1; row 0 at the inner rim, column 0 at azimuth 0.
+    """
     return np.stack(
         [
             random_picture(STREAKS, 2 * seed, width, height),
@@ -80,9 +105,21 @@ def disk_texture(seed: int = 1, width: int = TEXTURE_WIDTH, height: int = TEXTUR
 
 
 def look_up(texture: Array, radius: Array, phi: Array, inner: float, outer: float) -> Array:
-    """Return the texture at places on the disk, bilinearly, shape (..., channels).
+    """Return the texture at places on the disk, interpolated bilinearly.
 
-    Azimuth 0 to 2 pi runs across and wraps round; ln(r / inner) / ln(outer / inner) runs down and ends at the rims.
+    Azimuth 0 to 2 pi runs across and wraps around; ln(r / inner) / ln(outer / inner) runs down and ends at the rims.
+
+    Parameters
+    ----------
+    texture : ndarray, shape (rows, columns, channels)
+    radius, phi : ndarray, shape (...)
+        Units of M, and radians.
+    inner, outer : float
+        The disk's radii, units of M.
+
+    Returns
+    -------
+    ndarray, shape (..., channels)
     """
     height, width = texture.shape[:2]
     column = phi * (width / (2.0 * math.pi)) - 0.5
@@ -101,13 +138,41 @@ def look_up(texture: Array, radius: Array, phi: Array, inner: float, outer: floa
 
 
 def pattern_period(spin: float, inner: float, outer: float, retrograde: bool = False) -> float:
-    """Return P, the time that a pattern is shown for, units of M."""
+    """Return how long a pattern is shown: until its inner rim is `SHEAR_TURNS` ahead of its outer one.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    inner, outer : float
+        The disk's radii, units of M.
+    retrograde : bool
+        Whether the disk orbits against the hole's rotation.
+
+    Returns
+    -------
+    float
+        P, units of M.
+    """
     fast, slow = np.abs(orbital_frequency(spin, np.array([inner, outer]), retrograde))
     return float(2.0 * math.pi * SHEAR_TURNS / (fast - slow))
 
 
 def pattern_shares(time: float, period: float) -> list[tuple[float, float, float]]:
-    """Return age, share and turn (radians) of the two patterns at a time; the shares sum to 1."""
+    """Return the two patterns that are shown at a time.
+
+    Parameters
+    ----------
+    time : float
+        Units of M.
+    period : float
+        From `pattern_period`, units of M.
+
+    Returns
+    -------
+    list of (float, float, float)
+        Age (units of M), share and turn (radians) of each pattern; the shares sum to 1.
+    """
     patterns = []
     for delay in (0.0, 0.5):
         cycles = time / period + delay

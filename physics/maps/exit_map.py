@@ -54,25 +54,52 @@ class ExitMap:
 def bake_exit_map(
     parameters: WarpMapParameters, *, progress: Progress | None = None, cancel: Cancel | None = None
 ) -> ExitMap:
-    """Trace an exit map; parameters and errors are those of `warp_map.bake`.
+    """Trace an exit map.
+
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+        The camera's size is the map's, before supersampling.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1, after each block of rays.
+    cancel : callable, optional
+        Called before each block; if it returns true, the work ends.
+
+    Returns
+    -------
+    ExitMap
 
     Raises
     ------
     BlackHoleError
-        When no map can be made from these parameters, also for a method without exit lines.
+        If no map can be made from these parameters, or the method has no exit lines.
     Cancelled
-        When `cancel` returned true.
+        If `cancel` returned true.
     """
     return drain(bake_exit_map_steps(parameters), progress, cancel)
 
 
 def bake_exit_map_steps(parameters: WarpMapParameters) -> Generator[float, None, ExitMap]:
-    """Trace an exit map step by step: yields the fraction done after each block of rays, returns the map.
+    """Trace an exit map step by step.
+
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+        See `bake_exit_map`.
+
+    Yields
+    ------
+    float
+        The fraction done, 0 to 1, after each block of rays.
+
+    Returns
+    -------
+    ExitMap
 
     Raises
     ------
     BlackHoleError
-        Before the first step, when no map can be made from these parameters.
+        Before the first step, if no map can be made from these parameters, or the method has no exit lines.
     """
     parameters.validate()
     check_exit_method(parameters.method)

@@ -106,7 +106,20 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
 
 
 def turned_pass(earlier: DiskPass, azimuth: float, metadata: dict[str, object]) -> DiskPass:
-    """Return a disk's pass for a camera whose azimuth is larger by `azimuth` radians; everything else stays."""
+    """Return a disk's pass for a camera at another azimuth; only the azimuth on the disk changes.
+
+    Parameters
+    ----------
+    earlier : DiskPass
+    azimuth : float
+        By how much the camera's azimuth is larger, radians.
+    metadata : dict
+        Of the new map.
+
+    Returns
+    -------
+    DiskPass
+    """
     seen = earlier.coverage > 0.0
     phi = earlier.phi.copy()
     phi[seen] = wrap_once((phi[seen].astype(np.float64) + azimuth) % (2.0 * math.pi))

@@ -52,27 +52,46 @@ def bake(parameters: WarpMapParameters, *, progress: Progress | None = None, can
     progress : callable, optional
         Called with the fraction done, 0 to 1, after each block of rays.
     cancel : callable, optional
-        Asked before each block; true ends the work.
+        Called before each block; if it returns true, the work ends.
+
+    Returns
+    -------
+    WarpMap
+        With the passes of its disk, if it has one.
 
     Raises
     ------
     BlackHoleError
-        When no map can be made from these parameters.
+        If no map can be made from these parameters.
     Cancelled
-        When `cancel` returned true.
+        If `cancel` returned true.
     """
     return drain(bake_steps(parameters), progress, cancel)
 
 
 def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]:
-    """Trace a warp map step by step: yields the fraction done after each block of rays, returns the map.
+    """Trace a warp map step by step.
 
-    The steps take some tens of milliseconds each, so that a window can be kept alive between them.
+    A step takes some tens of milliseconds, so that a window can be kept alive between two steps.
+
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+
+    Yields
+    ------
+    float
+        The fraction done, 0 to 1, after each block of rays.
+
+    Returns
+    -------
+    WarpMap
+        With the passes of its disk, if it has one.
 
     Raises
     ------
     BlackHoleError
-        Before the first step, when no map can be made from these parameters.
+        Before the first step, if no map can be made from these parameters.
     """
     parameters.validate()
     view = View(parameters)

@@ -24,7 +24,7 @@ from ..kerr.critical_curve import around_hole, edge_angles
 from ..kerr.observer import Observer
 from ..kerr.rays import rays_from_triad, redshift_vector
 from ..numerics.arrays import Array, Image
-from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.blocks import blocks
 from ..numerics.sphere import cos_sin, spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import IDENTITY, WarpMapParameters
@@ -127,9 +127,19 @@ class WorldMap:
 
 
 def world_parameters(parameters: WarpMapParameters, grid: tuple[int, int] = FINAL) -> WarpMapParameters:
-    """Return what a world map is made from: the place and its motion, whichever way the camera is turned.
+    """Return what a world map is made from: the place and its motion, whatever the camera's orientation.
 
-    The camera stands for the map's size alone; a disk has no part in it.
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+        A frame's. Camera, orientation, interpolation and disk do not matter.
+    grid : (int, int)
+        Position angles, and places between the edge and the opposite point of the sky.
+
+    Returns
+    -------
+    WarpMapParameters
+        With a panorama camera that stands for the size of the map's texture.
     """
     columns, rows = grid
     return replace(
@@ -143,17 +153,26 @@ def world_parameters(parameters: WarpMapParameters, grid: tuple[int, int] = FINA
 
 
 def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, WorldMap]:
-    """Trace a world map step by step: yields the fraction done after each block of rays, returns the map.
+    """Trace a world map step by step.
 
     Parameters
     ----------
     parameters : WarpMapParameters
         From `world_parameters`.
 
+    Yields
+    ------
+    float
+        The fraction done, 0 to 1, after each block of rays.
+
+    Returns
+    -------
+    WorldMap
+
     Raises
     ------
     BlackHoleError
-        Before the first step, when no map can be made from these parameters.
+        Before the first step, if no map can be made from these parameters.
     """
     parameters.validate()
     observer, columns, rows = parameters.observer(), parameters.camera.width, parameters.camera.height - 1
@@ -166,11 +185,10 @@ def world_map_steps(parameters: WarpMapParameters) -> Generator[float, None, Wor
     looking = around_hole(edge + distances(heights)[:, None], aside, up).reshape(-1, 3)
     found = np.empty((len(looking), 3))
     fate = np.empty(len(looking), np.uint8)
-    for start in range(0, len(looking), BLOCK_SIZE):
-        block = slice(start, start + BLOCK_SIZE)
+    for block in blocks(len(looking)):
         rays = rays_from_triad(parameters.spin, fido, looking[block])
         fate[block], found[block] = trace_block(rays, parameters.tolerance, parameters.method)
-        yield min(block.stop, len(looking)) / len(looking)
+        yield block.stop / len(looking)
     to_world = np.array(parameters.hole_to_world)
     texture = np.empty((rows + 1, columns, 4), np.float32)
     texture[0] = _header(parameters, observer, heights)

@@ -57,7 +57,18 @@ def wrap(angle: NDArray[np.floating[Any]]) -> Image:
 
 
 def wrap_symmetric(angle: Array) -> Array:
-    """Return angles, in radians, wrapped to [-pi, pi]; the same shape."""
+    """Return angles wrapped to [-pi, pi].
+
+    Parameters
+    ----------
+    angle : ndarray
+        Radians, any finite values.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape.
+    """
     turn = 2.0 * math.pi
     near: Array = angle - turn * np.round(angle * (1.0 / turn))
     return near

@@ -11,6 +11,17 @@ BLOCK_SIZE = 32768
 
 
 def blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most `BLOCK_SIZE` items that cover `count` items in order."""
+    """Yield slices that cover a number of items in order.
+
+    Parameters
+    ----------
+    count : int
+        >= 0.
+
+    Yields
+    ------
+    slice
+        Of at most `BLOCK_SIZE` items.
+    """
     for start in range(0, count, BLOCK_SIZE):
         yield slice(start, min(start + BLOCK_SIZE, count))

@@ -25,7 +25,7 @@ def number(value: Any, what: str) -> float:
     Raises
     ------
     BlackHoleError
-        It is none.
+        If value is not one real number.
     """
     if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) != 0:
         raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.")
@@ -38,10 +38,21 @@ def number(value: Any, what: str) -> float:
 def finite(value: Any, what: str) -> float:
     """Return a single finite number as a float.
 
+    Parameters
+    ----------
+    value : object
+        See `number`.
+    what : str
+        How a message names it, with its article.
+
+    Returns
+    -------
+    float
+
     Raises
     ------
     BlackHoleError
-        It is none.
+        If value is not one finite real number.
     """
     result = number(value, what)
     if not math.isfinite(result):
@@ -50,12 +61,23 @@ def finite(value: Any, what: str) -> float:
 
 
 def three(value: Any, what: str) -> tuple[Any, Any, Any]:
-    """Return the three things that a value holds.
+    """Return the three parts of a value.
+
+    Parameters
+    ----------
+    value : object
+        Anything that can be iterated, but not text.
+    what : str
+        How a message names it, with its article.
+
+    Returns
+    -------
+    tuple of 3 objects
 
     Raises
     ------
     BlackHoleError
-        It does not hold three.
+        If value does not have three parts.
     """
     try:
         parts = [] if isinstance(value, str | bytes | bytearray) else list(value)
@@ -69,10 +91,21 @@ def three(value: Any, what: str) -> tuple[Any, Any, Any]:
 def vector(value: Any, what: str) -> tuple[float, float, float]:
     """Return three numbers as floats, NaN and infinities included.
 
+    Parameters
+    ----------
+    value : object
+        Anything that can be iterated, but not text.
+    what : str
+        How a message names it, with its article.
+
+    Returns
+    -------
+    tuple of float, shape (3,)
+
     Raises
     ------
     BlackHoleError
-        They are none.
+        If value is not three real numbers.
     """
     x, y, z = (number(part, what) for part in three(value, what))
     return x, y, z
@@ -81,10 +114,21 @@ def vector(value: Any, what: str) -> tuple[float, float, float]:
 def switch(value: Any, what: str) -> bool:
     """Return yes or no as a bool.
 
+    Parameters
+    ----------
+    value : object
+        A bool, Python's or numpy's.
+    what : str
+        How a message names it, with its article.
+
+    Returns
+    -------
+    bool
+
     Raises
     ------
     BlackHoleError
-        It is something else.
+        If value is not a bool.
     """
     if type(value).__name__ in ("bool", "bool_"):
         return bool(value)
@@ -92,12 +136,23 @@ def switch(value: Any, what: str) -> bool:
 
 
 def whole(value: Any, what: str) -> int:
-    """Return a whole number as an int; 3.0 is not one.
+    """Return a whole number as an int.
+
+    Parameters
+    ----------
+    value : object
+        An int, Python's or numpy's; 3.0 is not one.
+    what : str
+        How a message names it, with its article.
+
+    Returns
+    -------
+    int
 
     Raises
     ------
     BlackHoleError
-        It is none.
+        If value is not a whole number.
     """
     try:
         if getattr(value, "ndim", 0) == 0 and type(value) is not bool:
@@ -108,7 +163,17 @@ def whole(value: Any, what: str) -> int:
 
 
 def shown(value: Any) -> str:
-    """Return a value as a message shows it, on one line and not too long."""
+    """Return a value as a message shows it, on one line and not too long.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+        At most `LONGEST` characters of its `repr`.
+    """
     if isinstance(value, int) and abs(value) > 10**LONGEST:
         return "a huge number"
     text = " ".join(repr(value).split())

@@ -14,7 +14,17 @@ from .arrays import Array
 def cos_sin(angle: Array) -> tuple[Array, Array]:
     """Return cosine and sine, each to a few units of rounding, from the tangent of half the angle.
 
-    numpy's tangent runs in vector instructions where its sine and cosine do not: one costs a tenth of the others.
+    numpy's tangent runs in vector instructions, its sine and cosine do not: one tangent costs a tenth of both.
+
+    Parameters
+    ----------
+    angle : ndarray
+        Radians.
+
+    Returns
+    -------
+    cosine, sine : ndarray
+        Of the same shape.
     """
     half = np.tan(0.5 * angle)
     square = half * half
@@ -26,19 +36,52 @@ def cos_sin(angle: Array) -> tuple[Array, Array]:
 
 
 def by_component(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
-    """Return vectors of shape (..., 3) that lie in memory component by component, which numpy works through faster."""
+    """Return vectors that lie in memory component by component, which numpy processes faster.
+
+    Parameters
+    ----------
+    x, y, z : array_like
+        Shapes that broadcast.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+    """
     return np.moveaxis(np.stack(np.broadcast_arrays(x, y, z)), 0, -1)
 
 
 def unit_vectors(theta: ArrayLike, phi: ArrayLike) -> Array:
-    """Return (sin t cos p, sin t sin p, cos t), shape (..., 3), of polar and azimuthal angles in radians."""
+    """Return (sin t cos p, sin t sin p, cos t) of polar and azimuthal angles.
+
+    Parameters
+    ----------
+    theta, phi : array_like
+        Radians; shapes that broadcast.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+    """
     polar_cos, polar_sin = cos_sin(np.asarray(theta, dtype=np.float64))
     cosine, sine = cos_sin(np.asarray(phi, dtype=np.float64))
     return by_component(polar_sin * cosine, polar_sin * sine, polar_cos)
 
 
 def celestial_coordinates(direction: Array) -> tuple[Array, Array]:
-    """Return theta in [0, pi] and phi in [0, 2 pi) of vectors of shape (..., 3); NaN where they are NaN."""
+    """Return polar and azimuthal angle of directions.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (..., 3)
+        Vectors of any length but 0.
+
+    Returns
+    -------
+    theta : ndarray, shape (...)
+        Radians, [0, pi]; NaN where a direction is NaN.
+    phi : ndarray, shape (...)
+        Radians, [0, 2 pi); NaN where a direction is NaN.
+    """
     x, y, z = direction[..., 0], direction[..., 1], direction[..., 2]
     theta = np.arctan2(np.sqrt(x * x + y * y), z)
     phi = np.arctan2(y, x)
@@ -48,7 +91,18 @@ def celestial_coordinates(direction: Array) -> tuple[Array, Array]:
 
 
 def spherical_triad(theta: float, phi: float) -> Array:
-    """Return r-hat, theta-hat and phi-hat at a place as rows of Cartesian components, shape (3, 3)."""
+    """Return the unit vectors r-hat, theta-hat and phi-hat at a place.
+
+    Parameters
+    ----------
+    theta, phi : float
+        Radians.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows of Cartesian components.
+    """
     sin_theta, cos_theta = math.sin(theta), math.cos(theta)
     sin_phi, cos_phi = math.sin(phi), math.cos(phi)
     return np.array(

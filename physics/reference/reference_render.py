@@ -140,7 +140,16 @@ def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatAr
 
 
 def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:
-    """Pixels that no valid warp map can hold, shape (height, width): NaN, or a channel out of its range."""
+    """Return which pixels no valid warp map can have.
+
+    Parameters
+    ----------
+    warp_map : WarpMapLike
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+    """
     theta, phi, one_plus_z, visibility = _channels(warp_map)
     # Written as "not inside", so that NaN, which compares false with everything, counts as invalid.
     inside = (

@@ -84,13 +84,37 @@ class Tiles:
 
 
 def sides_for(width: int, height: int) -> tuple[int, ...]:
-    """Return the sides of `TILE_SIDES` that are used for a picture of this size, the largest first."""
+    """Return the sides of tiles that are used for a picture.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the map, pixels.
+
+    Returns
+    -------
+    tuple of int
+        The used ones of `TILE_SIDES`, the largest first.
+    """
     used = tuple(side for side in TILE_SIDES if width * height >= FEWEST_TILES * side * side)
     return used or TILE_SIDES[-1:]
 
 
 def tiles_of(width: int, height: int, side: int) -> Tiles:
-    """Return the tiles of one size that cover a picture."""
+    """Return the tiles of one size that cover a picture.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the map, pixels.
+    side : int
+        Of the tiles, pixels.
+
+    Returns
+    -------
+    Tiles
+        By rows from the top left.
+    """
     row, column = np.mgrid[0:height:side, 0:width:side]
     return Tiles(side, column.ravel(), row.ravel())
 
@@ -116,7 +140,17 @@ def pool(mask: Mask, cells: int) -> Mask:
 
 @cache
 def to_coefficients(count: int) -> Array:
-    """The matrix from values at Chebyshev points to Chebyshev coefficients, shape (count, count)."""
+    """Return the matrix from values at Chebyshev points to Chebyshev coefficients.
+
+    Parameters
+    ----------
+    count : int
+        Number of points, >= 1.
+
+    Returns
+    -------
+    ndarray, shape (count, count)
+    """
     order, point = np.mgrid[0:count, 0:count]
     matrix: Array = np.cos(np.pi * order * (count - 0.5 - point) / count) * (2.0 / count)
     matrix[0] *= 0.5
@@ -131,7 +165,19 @@ def _at_pixels(side: int, count: int) -> Array:
 
 
 def sample_places(tiles: Tiles, count: int = POINTS) -> tuple[Array, Array]:
-    """Return the pixel coordinates of the tiles' Chebyshev points, by tile, row and column, shape (n * count^2,)."""
+    """Return the pixel coordinates of the tiles' Chebyshev points.
+
+    Parameters
+    ----------
+    tiles : Tiles
+    count : int
+        Points along each side.
+
+    Returns
+    -------
+    x, y : ndarray, shape (n * count^2,)
+        By tile, row and column.
+    """
     places = chebyshev_places(count)
     x = tiles.column[:, None, None] + tiles.side * places[None, None, :]
     y = tiles.row[:, None, None] + tiles.side * places[None, :, None]
@@ -140,20 +186,55 @@ def sample_places(tiles: Tiles, count: int = POINTS) -> tuple[Array, Array]:
 
 
 def chebyshev_places(count: int = POINTS) -> Array:
-    """Return where along a tile's side its points, Chebyshev's of the first kind, are, 0 to 1, shape (count,)."""
+    """Return where the Chebyshev points of the first kind are along a tile's side.
+
+    Parameters
+    ----------
+    count : int
+        Number of points.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        Between 0 and 1, increasing.
+    """
     places: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     return places
 
 
 def coefficients_of(values: Array) -> Array:
-    """Return the Chebyshev coefficients of samples by row and column, shape (..., count, count)."""
+    """Return the Chebyshev coefficients of samples.
+
+    Parameters
+    ----------
+    values : ndarray, shape (..., count, count)
+        By row and column, at `sample_places`.
+
+    Returns
+    -------
+    ndarray, shape (..., count, count)
+        By the orders along the rows' and the columns' axes.
+    """
     matrix = to_coefficients(values.shape[-1])
     coefficients: Array = matrix @ values @ matrix.T
     return coefficients
 
 
 def at_pixels(side: int, count: int = POINTS) -> tuple[Array, Array]:
-    """Return the Chebyshev polynomials and their slopes per pixel at a tile's pixel centers, shape (side, count)."""
+    """Return the Chebyshev polynomials and their slopes at a tile's pixel centers.
+
+    Parameters
+    ----------
+    side : int
+        Of the tile, pixels.
+    count : int
+        Number of polynomials.
+
+    Returns
+    -------
+    polynomials, slopes : ndarray, shape (side, count)
+        The slopes are per pixel.
+    """
     angle = np.arccos(2.0 * (np.arange(side) + 0.5) / side - 1.0)[:, None]
     order = np.arange(count)
     # T_n' = n sin(n t) / sin(t), x = cos(t)
@@ -163,12 +244,20 @@ def at_pixels(side: int, count: int = POINTS) -> tuple[Array, Array]:
 def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
     """Sample tiles and judge whether the samples determine them.
 
+    Parameters
+    ----------
+    tiles : Tiles
+    directions : callable
+        See `Directions`.
+    tolerance : float
+        Radians, > 0.
+
     Returns
     -------
     coefficients : ndarray, shape (n, 3, POINTS, POINTS)
         Chebyshev coefficients of x, y, z by row and column.
     good : ndarray of bool, shape (n,)
-        Whether the interpolation's error is below `tolerance` radians; false where any sample sees no sky.
+        Whether the interpolation's error is below `tolerance`; false where any sample sees no sky.
     """
     values = directions(*sample_places(tiles)).reshape(len(tiles), POINTS, POINTS, -1)
     coefficients = coefficients_of(np.moveaxis(values, -1, 1))
@@ -177,18 +266,38 @@ def sample(tiles: Tiles, directions: Directions, tolerance: float) -> tuple[Arra
 
 
 def tails_of(coefficients: Array) -> Array:
-    """Return the sum of the highest coefficients' sizes, shape (n, channels), of tiles of shape (n, channels, count,
-    count): `TAIL_SHARE` of it is about what interpolation may be wrong by."""
+    """Return the sum of the highest coefficients' sizes: `TAIL_SHARE` of it is about the error of interpolation.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n, channels, count, count)
+
+    Returns
+    -------
+    ndarray, shape (n, channels)
+    """
     size = np.abs(coefficients)
     tails: Array = size[:, :, -TAIL:, :].sum(axis=(2, 3)) + size[:, :, :-TAIL, -TAIL:].sum(axis=(2, 3))
     return tails
 
 
 def interpolate(coefficients: Array, side: int, rotation: Array) -> NDArray[np.float32]:
-    """Return the unit vectors at the pixels of tiles, turned by `rotation`, shape (3, n, side, side).
+    """Return the unit vectors at the pixels of tiles, rotated.
 
-    The sums along the rows, the most of the work, are in single precision: what they lose is of the order of what
-    the map's own single precision loses, 1e-7.
+    The sums along the rows, most of the work, are in single precision: what they lose is of the order of what the map's
+    own single precision loses, 1e-7.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n, 3, POINTS, POINTS)
+        From `sample`.
+    side : int
+        Of the tiles, pixels.
+    rotation : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    ndarray of float32, shape (3, n, side, side)
     """
     vectors = _at_pixels(side, POINTS)
     turned = np.tensordot(rotation, coefficients, axes=(1, 1))

@@ -16,7 +16,7 @@ from ..kerr.metric import metric_functions
 from ..kerr.observer import Observer
 from ..kerr.rays import Rays, camera_triad, light_in_fido_frame, rays_from_axes, redshift_vector
 from ..numerics.arrays import Array
-from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.blocks import blocks
 from ..numerics.sphere import spherical_triad
 from ..shot.cameras import PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters
@@ -76,8 +76,7 @@ class View:
         """Return the edge function at map pixel coordinates x, y, any one shape, block by block."""
         shape, x, y = x.shape, x.ravel(), y.ravel()
         values = np.empty(x.shape)
-        for start in range(0, len(x), BLOCK_SIZE):
-            block = slice(start, start + BLOCK_SIZE)
+        for block in blocks(len(x)):
             values[block] = edge_function(self.rays(x[block], y[block]))
         return values.reshape(shape)
 

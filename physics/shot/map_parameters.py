@@ -198,9 +198,18 @@ class WarpMapParameters:
 
 
 def looking_at_hole(position: Vector) -> Matrix:
-    """Return the rotation `camera_to_hole` of a camera at `position` that looks at the hole, the axis upright.
+    """Return the orientation of a camera that looks at the hole, with the spin axis upright in the picture.
 
-    On the axis itself, where upright has no meaning, the picture's up is the direction of phi = 0 (x).
+    Parameters
+    ----------
+    position : tuple of float, shape (3,)
+        The camera, in the hole's frame, any unit; not at the origin.
+
+    Returns
+    -------
+    nested tuple of float, shape (3, 3)
+        `camera_to_hole` of `WarpMapParameters`. On the spin axis itself, where upright has no meaning, the picture's
+        up is the direction of phi = 0 (x).
     """
     back = np.array(position) / np.linalg.norm(position)
     right = np.cross([0.0, 0.0, 1.0], back)
@@ -212,7 +221,17 @@ def looking_at_hole(position: Vector) -> Matrix:
 
 
 def unstable_orbit_warning(parameters: WarpMapParameters) -> str | None:
-    """Return a sentence when the camera's circular orbit is inside the ISCO, else None."""
+    """Return a warning if the camera is on a circular orbit inside the ISCO.
+
+    Parameters
+    ----------
+    parameters : WarpMapParameters
+
+    Returns
+    -------
+    str or None
+        A sentence for the user, or None if there is nothing to warn of.
+    """
     if parameters.motion not in ("circular", "circular_retrograde"):
         return None
     isco = isco_radius(parameters.spin, prograde=parameters.motion == "circular")

@@ -15,7 +15,7 @@ from physics.files.disk_pass_file import pass_path
 from physics.images.exr import read_exr, write_exr
 from physics.images.png import srgb_from_linear
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def run(*arguments):

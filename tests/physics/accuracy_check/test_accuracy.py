@@ -32,7 +32,7 @@ from physics.maps.exit_map import bake_exit_map
 from physics.numerics.sphere import spherical_triad, unit_vectors
 from physics.numerics.work import drain
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 # Directions are stored as float32 angles: phi up to 2 pi is rounded by half of 4.8e-7 radians.
 STORED = 2.5e-7

@@ -46,7 +46,7 @@ from physics.images import exr
 from physics.images.exr import read_exr, read_exr_header
 from physics.maps.exit_map import bake_exit_map
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
