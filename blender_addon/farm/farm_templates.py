@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Templates for render farms, written to a folder: a job for Open Job Description, a job type for Flamenco, a script.
 
-Both templates carry the script `farm/umbra_farm.py` in them, so that each is a file that works alone.
+The script is `farm/umbra_farm.py` with the source of what it imports. Both templates contain it, so that each is a file
+that works alone.
 """
 
 import json
@@ -22,21 +23,28 @@ SCRIPT = "umbra_farm.py"
 OPENJD, FLAMENCO, PARAMETERS = "umbra_openjd.yaml", "umbra_black_hole.js", "umbra_openjd_parameters.json"
 
 _MARK = f"@{SCRIPT}@"
+# What the script imports from this package, and where that is.
+_IMPORT = "from ..bake.frame_list import FrameListError, frames_text, parse_frames, ranges\n"
+_IMPORTED = "../bake/frame_list.py"
+
+
+def script() -> str:
+    """Return the script for farms, which needs nothing but Blender."""
+    return _read(SCRIPT).replace(_IMPORT, _read(_IMPORTED))
 
 
 def openjd_template() -> str:
     """The job template, with the script as blocks of text in it."""
-    script = _read(SCRIPT)
     lines = []
     for line in _read("openjd_template.yaml").splitlines():
-        block = textwrap.indent(script, line.removesuffix(_MARK)).rstrip() if line.endswith(_MARK) else line
+        block = textwrap.indent(script(), line.removesuffix(_MARK)).rstrip() if line.endswith(_MARK) else line
         lines.append(block)
     return "\n".join(lines) + "\n"
 
 
 def flamenco_job_type() -> str:
     """The job type, with the script as a string in it."""
-    return _read("flamenco_job_type.js").replace(_MARK, json.dumps(_read(SCRIPT)))
+    return _read("flamenco_job_type.js").replace(_MARK, json.dumps(script()))
 
 
 def parameters_of(scene: bpy.types.Scene) -> dict[str, object]:
@@ -76,7 +84,7 @@ def save(scene: bpy.types.Scene, folder: Path) -> list[Path]:
         OPENJD: openjd_template(),
         PARAMETERS: json.dumps(parameters_of(scene), indent=2) + "\n",
         FLAMENCO: flamenco_job_type(),
-        SCRIPT: _read(SCRIPT),
+        SCRIPT: script(),
     }
     for name, text in texts.items():
         with exr.replacing(folder / name) as temporary:
