@@ -7,10 +7,9 @@ from collections.abc import Callable
 import bpy
 
 from .command import command_line
-from .farm import farm_copy, farm_templates
 from .render import handlers
 from .settings import properties
-from .ui import accuracy_check, cache_panel, disk_panel, operators, panels, preview_panel
+from .ui import accuracy_check, cache_panel, disk_panel, farm_operators, operators, panels, preview_panel
 
 _CLASSES = (
     *properties.CLASSES,
@@ -18,8 +17,7 @@ _CLASSES = (
     *panels.CLASSES,
     *disk_panel.CLASSES,
     *cache_panel.CLASSES,
-    *farm_copy.CLASSES,
-    *farm_templates.CLASSES,
+    *farm_operators.CLASSES,
     *accuracy_check.CLASSES,
     *preview_panel.CLASSES,
 )

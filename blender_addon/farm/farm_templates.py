@@ -14,8 +14,6 @@ import bpy
 from ..bake import maps
 from ..core.errors import SceneError
 from ..core.physics_api import exr
-from ..ui.operators import reporting
-from ..ui.sidebar import HolePanel
 from . import farm_copy
 
 SOURCES = Path(__file__).parent
@@ -94,48 +92,3 @@ def save(scene: bpy.types.Scene, folder: Path) -> list[Path]:
 
 def _read(name: str) -> str:
     return (SOURCES / name).read_text(encoding="utf-8")
-
-
-class UMBRA_OT_save_farm_templates(bpy.types.Operator):
-    bl_idname = "umbra.save_farm_templates"
-    bl_label = "Save Farm Templates..."
-    bl_description = (
-        "Write job templates for render farms (Open Job Description, Flamenco) and their script to a folder; and a "
-        "farm copy of this file where it needs one"
-    )
-    bl_options = {"REGISTER"}
-
-    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
-    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = context.scene
-        written = save(scene, Path(bpy.path.abspath(self.directory)))
-        self.report({"INFO"}, f"Wrote {', '.join(path.name for path in written)}.")
-        if farm_copy.needs_copy(scene):
-            try:
-                bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
-            except RuntimeError as error:  # what the other operator has reported
-                raise SceneError(str(error).removeprefix("Error: ").strip()) from error
-        return {"FINISHED"}
-
-
-class VIEW3D_PT_umbra_farm(HolePanel, bpy.types.Panel):
-    bl_label = "Render Farm"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        column.enabled = bool(bpy.data.filepath)
-        column.operator("umbra.save_farm_templates", icon="FILE_FOLDER")
-        column.operator("umbra.save_farm_copy", icon="DUPLICATE")
-        if not bpy.data.filepath:
-            self.layout.label(text="Save this file first.", icon="INFO")
-
-
-CLASSES = (UMBRA_OT_save_farm_templates, VIEW3D_PT_umbra_farm)
