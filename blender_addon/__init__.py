@@ -8,12 +8,20 @@ import bpy
 
 from .command import command_line
 from .core.session import SESSION, Life
-from .farm import farm_copy, farm_templates
 from .outputs import registration as outputs
 from .preview import live_preview
 from .render import handlers
 from .settings import disk_properties, hole_properties, scene_properties
-from .ui import accuracy_check, bake_operators, cache_panel, disk_panel, operators, panels, preview_panel
+from .ui import (
+    accuracy_check,
+    bake_operators,
+    cache_panel,
+    disk_panel,
+    farm_operators,
+    operators,
+    panels,
+    preview_panel,
+)
 
 _CLASSES = (
     *disk_properties.CLASSES,
@@ -24,8 +32,7 @@ _CLASSES = (
     *panels.CLASSES,
     *disk_panel.CLASSES,
     *cache_panel.CLASSES,
-    *farm_copy.CLASSES,
-    *farm_templates.CLASSES,
+    *farm_operators.CLASSES,
     *accuracy_check.CLASSES,
     *preview_panel.CLASSES,
 )

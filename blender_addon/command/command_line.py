@@ -237,7 +237,7 @@ def _json_stream(target: str | None, stack: contextlib.ExitStack) -> TextIO | No
 def _frames(text: str) -> list[int]:
     try:
         return frame_list.parse_frames(text)
-    except physics.BlackHoleError as error:
+    except frame_list.FrameListError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 

@@ -10,18 +10,15 @@ from collections import defaultdict
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from time import perf_counter
 
 import bpy
 
 from ..core.errors import SceneError
-from ..core.physics_api import physics
 from ..outputs import frames as frame_maps
 from ..outputs import registry
 from ..outputs.protocol import FrameCarrier, Track
 from ..outputs.shared import disk_light
 from ..scene import frame_setup
-from ..ui.reporting import TIMER_INTERVAL, reporting
 
 SUFFIX = "_farm"
 # On the scene, in the copy: the first and last frame that have keyframes. `farm/umbra_farm.py` reads it.
@@ -38,8 +35,8 @@ def path_beside(blend: Path) -> Path:
     return blend.with_name(f"{blend.stem}{SUFFIX}.blend")
 
 
-def _every_frame(scene: bpy.types.Scene) -> range:
-    """The scene's frames, those between steps too: a farm's chunks have no steps."""
+def frames_of(scene: bpy.types.Scene) -> range:
+    """Return the scene's frames, those between steps too: a farm's chunks have no steps."""
     return range(scene.frame_start, scene.frame_end + 1)
 
 
@@ -220,87 +217,3 @@ class _Curve:
         bpy.data.actions.remove(self.new_action)
         if not self.had_animation:
             self.owner.animation_data_clear()
-
-
-# --- the operator --------------------------------------------------------------------------------
-
-
-class UMBRA_OT_save_farm_copy(bpy.types.Operator):
-    bl_idname = "umbra.save_farm_copy"
-    bl_label = "Save Farm Copy"
-    bl_description = (
-        "Save a copy beside this file whose frames render without this add-on, with what it does in each frame as "
-        "keyframes. Needed for the Cycles Lens and for a disk whose settings are animated"
-    )
-    bl_options = {"REGISTER"}
-
-    _steps: Generator[float, None, Path] | None = None
-    _timer: bpy.types.Timer | None = None
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = context.scene
-        steps = save(scene, _every_frame(scene))
-        while self._go_on(steps) is None:
-            pass
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        manager = context.window_manager
-        self._steps = save(context.scene, _every_frame(context.scene))
-        manager.progress_begin(0.0, 1.0)
-        self._timer = manager.event_timer_add(TIMER_INTERVAL, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Take steps for a moment; other events than Esc are swallowed, so that the file stays as it is."""
-        if event.type == "ESC" and event.value == "PRESS":
-            self.report({"INFO"}, "The farm copy was not written.")
-            return self._end(context, {"CANCELLED"})
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        until = perf_counter() + TIMER_INTERVAL
-        while perf_counter() < until:
-            try:
-                result = self._go_on(self._steps, context)
-            except physics.BlackHoleError as error:
-                self.report({"ERROR"}, str(error))
-                return self._end(context, {"CANCELLED"})
-            except Exception:
-                self._end(context, {"CANCELLED"})
-                raise
-            if result is not None:
-                return self._end(context, {"FINISHED"})
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._end(context, {"CANCELLED"})
-
-    def _go_on(self, steps: Generator[float, None, Path], context: bpy.types.Context | None = None) -> Path | None:
-        """Take a step, and say how far it is; the copy's path when it is done."""
-        try:
-            share = next(steps)
-        except StopIteration as end:
-            self.report({"INFO"}, f"Wrote {end.value.name}.")
-            return end.value
-        if context is not None:
-            context.window_manager.progress_update(share)
-            context.workspace.status_text_set(f"Saving the farm copy: {share:.0%} done.  Esc stops.")
-        return None
-
-    def _end(self, context: bpy.types.Context, result: set[str]) -> set[str]:
-        if self._steps is not None:
-            self._steps.close()
-            self._steps = None
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-        return result
-
-
-CLASSES = (UMBRA_OT_save_farm_copy,)

@@ -9,6 +9,8 @@ Blender runs this file. Rendering and looking need no add-on; baking starts a se
     blender -b FILE --python-exit-code 1 --python umbra_farm.py -- render --frames=1-10 --output /renders/shot_####
     blender -b --factory-startup --python-exit-code 1 --python umbra_farm.py -- bake --frames=1-10 --file FILE
 
+In the add-on this file is a part of what `farm_templates.script` writes, which stands alone.
+
 Progress and failures are printed as Open Job Description understands them (openjd_progress, openjd_status,
 openjd_fail); elsewhere they are lines of the log like any other.
 """
@@ -21,6 +23,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+
+from ..bake.frame_list import FrameListError, frames_text, parse_frames, ranges
 
 # As the add-on marks its nodes and numbers its files.
 ROLE = "umbra_role"
@@ -48,25 +52,11 @@ def tell(kind: str, text: object) -> None:
     print(f"openjd_{kind}: {text}", flush=True)
 
 
-def parse_frames(text: str) -> list[int]:
-    """Frames from a list such as 1-3,7 (or 1..3,7); numbers may be negative."""
-    frames: set[int] = set()
-    for part in text.split(","):
-        match = re.fullmatch(r"\s*(-?\d+)\s*(?:(?:-|\.\.)\s*(-?\d+))?\s*", part)
-        if match is None:
-            raise Fault(f'The frames "{text}" cannot be understood: write 7, 1-10 or 1-3,7.')
-        first, last = int(match[1]), int(match[2] or match[1])
-        if last < first:
-            raise Fault(f'The frames "{text}" run backwards: write the smaller number first.')
-        frames.update(range(first, last + 1))
-    return sorted(frames)
-
-
 def arguments() -> argparse.Namespace:
     """What stands behind `--` on Blender's command line; nothing means check."""
     parser = argparse.ArgumentParser(prog="umbra_farm.py", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("task", choices=("bake", "render", "check"), help="what to do")
-    parser.add_argument("--frames", help="such as 7, 1-10 or 1-3,7; the scene's own without")
+    parser.add_argument("--frames", help="as in 1-250, or 1,5,9-12, or 1-250x2; the scene's own without")
     parser.add_argument("--count", type=int, help="no more than so many frames, from the first")
     parser.add_argument("--last", type=int, help="no frame after this one")
     parser.add_argument("--output", default="", help="where pictures go, # for digits; the scene's own without")
@@ -85,7 +75,10 @@ def frames_of(options: argparse.Namespace) -> list[int]:
     if options.count is not None:
         if options.count < 1:
             raise Fault(f"Frames per task is {options.count}: it must be 1 or more.")
-        frames = list(range(frames[0], frames[0] + options.count))
+        last = frames[0] + options.count - 1
+        if options.last is not None:
+            last = max(frames[0], min(last, options.last))
+        frames = parse_frames(f"{frames[0]}-{last}")
     if options.last is not None:
         frames = [frame for frame in frames if frame <= options.last]
     if not frames:
@@ -233,7 +226,7 @@ def render(frames: list[int], output: str) -> None:
 
     bpy.app.handlers.render_write.append(on_write)
     scene.frame_step = 1
-    for scene.frame_start, scene.frame_end in stretches(frames):
+    for scene.frame_start, scene.frame_end in ranges(frames):
         bpy.ops.render.render(animation=True, scene=scene.name)
     bpy.app.handlers.render_write.remove(on_write)
     left = sorted(set(frames) - set(written))
@@ -241,20 +234,9 @@ def render(frames: list[int], output: str) -> None:
         raise Fault(f"Frame {left[0]} was not written: the lines above say why.")
 
 
-def stretches(frames: list[int]) -> Iterator[tuple[int, int]]:
-    """First and last frames of the stretches without a gap."""
-    first = before = frames[0]
-    for frame in [*frames[1:], None]:
-        if frame != before + 1:
-            yield first, before
-            first = frame
-        before = frame
-
-
 def bake(frames: list[int], blender: str, file: str) -> None:
     """Bake by the add-on's own command, and pass its progress and its failure on."""
-    wanted = ",".join(f"{first}-{last}" for first, last in stretches(frames))
-    command = [blender, "-b", file, "-c", "umbra", "bake", f"--frames={wanted}"]
+    command = [blender, "-b", file, "-c", "umbra", "bake", f"--frames={frames_text(frames)}"]
     try:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", errors="replace"
@@ -290,7 +272,7 @@ def main() -> None:
             render(frames, options.output)
         else:
             check(frames)
-    except Fault as fault:
+    except (Fault, FrameListError) as fault:
         print(f"{FAILURE}{fault}", file=sys.stderr, flush=True)
         sys.exit(1)
 

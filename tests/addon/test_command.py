@@ -88,7 +88,7 @@ def test_what_bake_tells(
 @pytest.mark.parametrize(
     ("line", "status", "sentence"),
     [
-        ("bake --frames 1-", 2, "no list of frames"),
+        ("bake --frames 1-", 2, "not a list of frames"),
         ("fetch", 2, "invalid choice"),
         ("bake --scene Nowhere", 1, 'its scenes are "Scene"'),
         ("bake --view-layer Nowhere", 1, 'no view layer "Nowhere"'),

@@ -12,12 +12,13 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
-from small_scene import ROOT, add_hole, read, run_python, shrink
+from small_scene import add_hole, read, run_python, shrink
+
+from blender_addon.farm import farm_templates
 
 FRAMES = (1, 2)
 # Keyframes hold single precision, the drivers whose place they take double.
 ROUNDING = 1e-5
-SCRIPT = ROOT / "blender_addon" / "farm" / "umbra_farm.py"
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*use_nodes.*:DeprecationWarning")
 
@@ -90,6 +91,8 @@ def render_all(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> list[
 
 def run_without_addon(*runs: tuple[Path, str]) -> subprocess.CompletedProcess[str]:
     """The script with files and arguments, in a Blender where the extension is not installed."""
+    script = runs[0][0].with_name("umbra_farm.py")
+    script.write_text(farm_templates.script(), encoding="utf-8")
     return run_python(
         "import runpy\n"
         "assert not hasattr(bpy.types.Scene, 'umbra')\n"
@@ -98,7 +101,7 @@ def run_without_addon(*runs: tuple[Path, str]) -> subprocess.CompletedProcess[st
         "    sys.argv[1:] = ['--', *arguments]\n"
         "    status = 0\n"
         "    try:\n"
-        f"        runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
+        f"        runpy.run_path({str(script)!r}, run_name='__main__')\n"
         "    except SystemExit as end:\n"
         "        status = end.code\n"
         "    print('status', status)\n",

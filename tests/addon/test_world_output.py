@@ -409,13 +409,14 @@ def test_a_world_override_is_refused(scene: bpy.types.Scene, modules: Callable) 
         modules("outputs.world.output").check_world(scene)
 
 
-def test_a_farm_looks_for_world_maps(scene: bpy.types.Scene, tmp_path: Path, physics: ModuleType) -> None:
+def test_a_farm_looks_for_world_maps(scene: bpy.types.Scene, tmp_path: Path, modules: Callable) -> None:
     """Without the add-on a World without its map would be magenta, and the exit status 0."""
     switch()
     assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
     blend = tmp_path / "world.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    script = Path(physics.__file__).parents[1] / "farm" / "umbra_farm.py"
+    script = tmp_path / "umbra_farm.py"
+    script.write_text(modules("farm.farm_templates").script(), encoding="utf-8")
     check = f"""
 import importlib.util, pathlib
 spec = importlib.util.spec_from_file_location("umbra_farm", {str(script)!r})
