@@ -31,18 +31,25 @@ def parse_frames(text: str) -> list[int]:
         match = _PART.fullmatch(part.strip())
         if match is None:
             raise physics.BlackHoleError(
-                f'"{text}" is no list of frames: write them as in 1-250, or 1,5,9-12, or 1-250x2.'
+                f'"{text}" is no list of frames: write them as in 1-250, or 1,5,9-12, or 1-250x2.',
+                code="command.frames",
             )
         first = int(match[1])
         last = first if match[2] is None else int(match[2])
         step = 1 if match[3] is None else int(match[3])
         if last < first:
-            raise physics.BlackHoleError(f'The frames "{part.strip()}" end before they begin: write {last}-{first}.')
+            raise physics.BlackHoleError(
+                f'The frames "{part.strip()}" end before they begin: write {last}-{first}.', code="command.frames"
+            )
         if step == 0:
-            raise physics.BlackHoleError(f'The frames "{part.strip()}" have a step of 0: give 1 or more.')
+            raise physics.BlackHoleError(
+                f'The frames "{part.strip()}" have a step of 0: give 1 or more.', code="command.frames"
+            )
         count = (last - first) // step + 1
         if len(frames) + count > MOST_FRAMES:
-            raise physics.BlackHoleError(f'"{text}" names more than {MOST_FRAMES} frames: give fewer.')
+            raise physics.BlackHoleError(
+                f'"{text}" names more than {MOST_FRAMES} frames: give fewer.', code="command.frames"
+            )
         frames.update(dict.fromkeys(range(first, last + 1, step)))
     return list(frames)
 

@@ -48,7 +48,9 @@ def parameters_of(scene: bpy.types.Scene) -> dict[str, object]:
         The file is not saved yet.
     """
     if not bpy.data.filepath:
-        raise SceneError("This file is not saved yet: save it, so that the farm's machines can open it.")
+        raise SceneError(
+            "This file is not saved yet: save it, so that the farm's machines can open it.", code="farm.not-saved"
+        )
     blend = Path(bpy.data.filepath)
     picture = Path(bpy.path.abspath(scene.render.filepath))
     is_folder = scene.render.filepath.endswith(("/", "\\"))
@@ -112,8 +114,9 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         if farm_copy.needs_copy(scene):
             try:
                 bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
-            except RuntimeError as error:  # what the other operator has reported
-                raise SceneError(str(error).removeprefix("Error: ").strip()) from error
+            except RuntimeError as error:  # what the other operator has reported, with its code
+                self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+                return {"CANCELLED"}
         return {"FINISHED"}
 
 
