@@ -116,7 +116,9 @@ def provide(wanted: MapRequest, *, may_bake: bool) -> None:
     if fault is None:
         return
     if not may_bake:
-        raise SceneError(f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.")
+        raise SceneError(
+            f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.", code="map.out-of-date"
+        )
     prepare(wanted)
     with claim.Claims() as claims:
         if not take(claims, wanted):
@@ -141,7 +143,10 @@ def _wait_for_claim(claims: claim.Claims, wanted: MapRequest) -> None:
         print(f"Umbra: waiting for {wanted.what}, which {claims.holder(wanted.path)} bakes", flush=True)
         while not take(claims, wanted):
             if stop.asked:
-                raise SceneError(f"Stopped while waiting for {wanted.what}, which {claims.holder(wanted.path)} bakes.")
+                raise SceneError(
+                    f"Stopped while waiting for {wanted.what}, which {claims.holder(wanted.path)} bakes.",
+                    code="command.stopped",
+                )
             time.sleep(POLL)
 
 
@@ -302,7 +307,7 @@ def naming(frame: int, count: int) -> Iterator[None]:
     except physics.BlackHoleError as error:
         if count == 1 or _NAMED.match(str(error)):
             raise
-        raise SceneError(f"Frame {frame}: {error}") from error
+        raise SceneError(f"Frame {frame}: {error}", code=error.code) from error
 
 
 def _write(wanted: MapRequest, baked: Any, count: int) -> None:

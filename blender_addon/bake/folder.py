@@ -69,7 +69,8 @@ def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:
     if free < needed:
         raise MapFolderError(
             f"The disk of the warp map folder {parent} is full: {free / 1e6:.0f} MB are free, a map needs up "
-            f"to {needed / 1e6:.0f} MB; free some space or choose another folder."
+            f"to {needed / 1e6:.0f} MB; free some space or choose another folder.",
+            code="folder.full",
         )
 
 
@@ -93,12 +94,14 @@ def explain(error: OSError, place: Path) -> MapFolderError:
     """The sentence for a failure of the file system."""
     if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
         return MapFolderError(
-            f"The disk of the warp map folder {place} is full: free some space or choose another folder."
+            f"The disk of the warp map folder {place} is full: free some space or choose another folder.",
+            code="folder.full",
         )
     reason = error.strerror or str(error)
     return MapFolderError(
         f"The warp map folder {place} cannot be written to ({reason}): choose another folder in the Umbra "
-        "panel, or change its permissions."
+        "panel, or change its permissions.",
+        code="folder.not-writable",
     )
 
 
@@ -107,7 +110,8 @@ def explain_reading(error: OSError, place: Path) -> MapFolderError:
     reason = error.strerror or str(error)
     return MapFolderError(
         f"The warp map folder {place} cannot be read ({reason}): choose another folder in the Umbra panel, or change "
-        "its permissions."
+        "its permissions.",
+        code="folder.not-readable",
     )
 
 

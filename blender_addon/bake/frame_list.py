@@ -13,7 +13,10 @@ MOST_FRAMES = 1_000_000
 
 
 class FrameListError(ValueError):
-    """A text that is not a list of frames: one sentence that says why."""
+    """A text that is not a list of frames: one sentence that says why, and its code in the manual."""
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(f"{sentence} [command.frames]")
 
 
 def parse_frames(text: str) -> list[int]:

@@ -167,7 +167,8 @@ def file_name(
     if not FIRST_FRAME <= frame <= LAST_FRAME:
         raise SceneError(
             f"Frame {frame} is outside {FIRST_FRAME} to {LAST_FRAME}, the frames that warp maps can be "
-            "numbered by: move the animation."
+            "numbered by: move the animation.",
+            code="map.frame-number",
         )
     end = f"{kind.mark}{frame % SEQUENCE_LENGTH:04d}"
     if kind.is_hashed and parameters is not None:

@@ -15,7 +15,7 @@ import bpy
 from ..bake import baking, check, frame_list
 from ..bake.folder import folder
 from ..core import stopping
-from ..core.errors import MapFolderError, SceneError
+from ..core.errors import MapFolderError, SceneError, unexpected
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames as frame_maps
@@ -47,21 +47,20 @@ def run(arguments: Sequence[str]) -> int:
         try:
             stream = _json_stream(options.json, stack)
         except MapFolderError as error:
-            print(f"error: {error}", file=sys.stderr, flush=True)
-            return FAILED
+            return Output(None, quiet=True).fail(error)
         out = Output(stream, quiet=stream is sys.stdout)
         try:
             with stopping.stoppable() as out.stop:
                 scene = _scene_of(options)
                 status, summary = options.work(options, scene, _frames_of(options, scene), out)
         except KeyboardInterrupt:
-            return out.fail("Stopped; the maps that are finished stay.")
+            return out.fail(SceneError("Stopped; the maps that are finished stay.", code="command.stopped"))
         except physics.BlackHoleError as error:
             hint = "" if bpy.data.filepath else " No .blend file is open: is it there, and named before -c?"
-            return out.fail(f"{error}{hint}")
+            return out.fail(SceneError(f"{error}{hint}", code=error.code))
         except Exception as error:  # noqa: BLE001  (Blender would print it and go on)
             traceback.print_exc()
-            return out.fail(f"An unexpected fault ({type(error).__name__}: {error}); please report it.")
+            return out.fail(unexpected(error))
         out.event("end", status=status, **summary)
     return status
 
@@ -83,10 +82,10 @@ class Output:
         if self._json is not None:
             print(json.dumps({"event": event, **values}), file=self._json, flush=True)
 
-    def fail(self, sentence: str) -> int:
+    def fail(self, error: "physics.BlackHoleError") -> int:
         """Say why the command has failed; return the exit status."""
-        print(f"error: {sentence}", file=sys.stderr, flush=True)
-        self.event("end", status=FAILED, error=sentence)
+        print(f"error: {error.for_user()}", file=sys.stderr, flush=True)
+        self.event("end", status=FAILED, error=str(error), code=error.code)
         return FAILED
 
 
@@ -204,7 +203,7 @@ def scene_named(name: str) -> bpy.types.Scene:
     scene = bpy.data.scenes.get(name)
     if scene is None:
         names = ", ".join(f'"{each.name}"' for each in bpy.data.scenes)
-        raise SceneError(f'There is no scene "{name}" in this file: its scenes are {names}.')
+        raise SceneError(f'There is no scene "{name}" in this file: its scenes are {names}.', code="command.no-scene")
     return scene
 
 
@@ -216,7 +215,8 @@ def _frames_of(options: argparse.Namespace, scene: bpy.types.Scene) -> list[int]
     if options.view_layer is not None and options.view_layer not in scene.view_layers:
         raise SceneError(
             f'Scene "{scene.name}" has no view layer "{options.view_layer}": it has '
-            f"{', '.join(each.name for each in scene.view_layers)}."
+            f"{', '.join(each.name for each in scene.view_layers)}.",
+            code="command.no-view-layer",
         )
     return list(frame_setup.frames_of(scene)) if options.frames is None else options.frames
 
@@ -230,7 +230,8 @@ def _json_stream(target: str | None, stack: contextlib.ExitStack) -> TextIO | No
         return stack.enter_context(Path(target).open("w", encoding="utf-8"))
     except OSError as error:
         raise MapFolderError(
-            f"The JSON file {target} cannot be written ({(error.strerror or str(error)).lower()}): name another one."
+            f"The JSON file {target} cannot be written ({(error.strerror or str(error)).lower()}): name another one.",
+            code="command.json-file",
         ) from error
 
 

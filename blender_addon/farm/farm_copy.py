@@ -52,16 +52,19 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
         The file is not saved yet, a frame cannot be rendered, or a driver cannot be written as keyframes.
     """
     if not bpy.data.filepath:
-        raise SceneError("This file is not saved yet: save it, then save its farm copy.")
+        raise SceneError("This file is not saved yet: save it, then save its farm copy.", code="farm.not-saved")
     hole = frame_setup.active_hole(scene)
     if disk_light.find(hole) is not None and _has_animated_settings(hole):
         raise SceneError(
             f'The disk of "{hole.name}" lights the scene, and its settings are animated, which a mesh cannot follow '
-            "without the add-on: switch Light the Scene off, or render with the add-on."
+            "without the add-on: switch Light the Scene off, or render with the add-on.",
+            code="farm.lighting-disk",
         )
     path = path_beside(Path(bpy.data.filepath))
     if FRAMES in scene:
-        raise SceneError("This file is a farm copy already: open the file that it was made from.")
+        raise SceneError(
+            "This file is a farm copy already: open the file that it was made from.", code="farm.copy-of-copy"
+        )
     drivers = list(_drivers_of_settings())
     carrier = registry.of(scene).carrier(scene)
     tracks = yield from _read(scene, frames, drivers, carrier)
@@ -69,7 +72,9 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
         except RuntimeError as error:
-            raise SceneError(f"The farm copy {path} cannot be written ({str(error).strip()}).") from error
+            raise SceneError(
+                f"The farm copy {path} cannot be written ({str(error).strip()}).", code="farm.not-written"
+            ) from error
     return path
 
 
@@ -140,7 +145,8 @@ def _source_value(owner: bpy.types.ID, curve: bpy.types.FCurve) -> float:
     if len(variables) != 1 or variables[0].type != "SINGLE_PROP" or not plain:
         raise SceneError(
             f'The driver of "{owner.name}", {curve.data_path}, works with settings of the black hole, which a Blender '
-            "without the add-on does not know: replace it by keyframes."
+            "without the add-on does not know: replace it by keyframes.",
+            code="farm.driver",
         )
     target = variables[0].targets[0]
     return float(target.id.path_resolve(target.data_path))
@@ -197,7 +203,8 @@ class _Curve:
         self.curve = action.fcurve_ensure_for_datablock(self.owner, path, index=index)
         if len(self.curve.keyframe_points):
             raise SceneError(
-                f'"{self.owner.name}" has keyframes of its own on {path}, which the black hole writes: remove them.'
+                f'"{self.owner.name}" has keyframes of its own on {path}, which the black hole writes: remove them.',
+                code="farm.own-keyframes",
             )
         points = self.curve.keyframe_points
         points.add(len(values))

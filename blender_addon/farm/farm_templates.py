@@ -54,7 +54,9 @@ def parameters_of(scene: bpy.types.Scene) -> dict[str, object]:
         The file is not saved yet.
     """
     if not bpy.data.filepath:
-        raise SceneError("This file is not saved yet: save it, so that the farm's machines can open it.")
+        raise SceneError(
+            "This file is not saved yet: save it, so that the farm's machines can open it.", code="farm.not-saved"
+        )
     blend = Path(bpy.data.filepath)
     picture = Path(bpy.path.abspath(scene.render.filepath))
     is_folder = scene.render.filepath.endswith(("/", "\\"))

@@ -37,14 +37,19 @@ READ_BY_FRAME = re.compile(r"map|disk_pass_\d+")
 SEQUENCE_LENGTH = 1_000_000
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
-# How sentences of failures begin: the add-on's while it renders, and those of its command.
-FAILURE, COMMAND_FAILURE = "Error: Umbra Black Hole: ", "error: "
+# How the add-on's failures begin while it renders.
+FAILURE = "Error: Umbra Black Hole: "
+# A failure of its command: the sentence and the code, which add-ons of version 0.1.0 lack.
+COMMAND_FAILURE = re.compile(r"error: (.*?)(?: \[([a-z.-]+)\])?")
 # A line of that command for each frame that is done.
 FRAME_DONE = re.compile(r"Umbra: .*(Frame -?\d+).*: (baked|still valid)")
 
 
 class Fault(Exception):
-    """One sentence that says what is wrong and what to do."""
+    """One sentence that says what is wrong and what to do, and its code from the manual's troubleshooting page."""
+
+    def __init__(self, sentence: str, *, code: str) -> None:
+        super().__init__(f"{sentence} [{code}]")
 
 
 def tell(kind: str, text: object) -> None:
@@ -74,7 +79,7 @@ def frames_of(options: argparse.Namespace) -> list[int]:
     frames = parse_frames(options.frames)
     if options.count is not None:
         if options.count < 1:
-            raise Fault(f"Frames per task is {options.count}: it must be 1 or more.")
+            raise Fault(f"Frames per task is {options.count}: it must be 1 or more.", code="command.frames")
         last = frames[0] + options.count - 1
         if options.last is not None:
             last = max(frames[0], min(last, options.last))
@@ -82,7 +87,7 @@ def frames_of(options: argparse.Namespace) -> list[int]:
     if options.last is not None:
         frames = [frame for frame in frames if frame <= options.last]
     if not frames:
-        raise Fault("There is no frame to work on: the last frame is before the first.")
+        raise Fault("There is no frame to work on: the last frame is before the first.", code="command.frames")
     return frames
 
 
@@ -108,7 +113,10 @@ def map_images(scene: bpy.types.Scene) -> Iterator[bpy.types.Image]:
     groups = {node.node_tree for node in ([] if tree is None else tree.nodes) if node.type == "GROUP" and not node.mute}
     nodes = [node for group in groups if group is not None for node in group.nodes if WORLD_MAP in node]
     if any(node.image is None or node.image.source != "SEQUENCE" for node in nodes):
-        raise Fault("The lensed World reads no maps: open the file with the add-on and save it again.")
+        raise Fault(
+            "The lensed World reads no maps: open the file with the add-on and save it again.",
+            code="farm.world-without-maps",
+        )
     yield from {node.image for node in nodes}
 
 
@@ -138,7 +146,8 @@ def check_light(scene: bpy.types.Scene) -> None:
         if any(curve.data_path.startswith(SETTINGS) for curve in curves):
             raise Fault(
                 f'The disk of "{each.parent.name}" lights the scene, and its settings are animated: render with the '
-                "add-on, or switch Light the Scene off."
+                "add-on, or switch Light the Scene off.",
+                code="farm.lighting-disk",
             )
 
 
@@ -150,7 +159,8 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
         outside = [frame for frame in frames if not known[0] <= frame <= known[1]]
         if outside:
             raise Fault(
-                f"Frame {outside[0]} is not in this farm copy, which has {known[0]} to {known[1]}: save it anew."
+                f"Frame {outside[0]} is not in this farm copy, which has {known[0]} to {known[1]}: save it anew.",
+                code="farm.frame-not-copied",
             )
         return
     cameras = [scene.camera, *(marker.camera for marker in scene.timeline_markers)]
@@ -167,7 +177,8 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
     if lensed or any(target.data_path.startswith(SETTINGS) for target in targets):
         raise Fault(
             "This file needs the add-on in each frame (for the Cycles Lens, or a disk whose settings are animated): "
-            "render its farm copy, which Save Farm Copy in the Umbra panel writes."
+            "render its farm copy, which Save Farm Copy in the Umbra panel writes.",
+            code="farm.needs-add-on",
         )
 
 
@@ -183,10 +194,13 @@ def check(frames: list[int]) -> None:
     for frame in frames:
         for path in map_files(scene, frame):
             if not path.is_file():
-                raise Fault(f"Frame {frame}: the map {path} is missing: bake it, or bring the maps' folder along.")
+                raise Fault(
+                    f"Frame {frame}: the map {path} is missing: bake it, or bring the maps' folder along.",
+                    code="farm.map-missing",
+                )
             with path.open("rb") as file:
                 if file.read(len(EXR_MAGIC)) != EXR_MAGIC:
-                    raise Fault(f"Frame {frame}: the map {path} is damaged: bake it again.")
+                    raise Fault(f"Frame {frame}: the map {path} is damaged: bake it again.", code="farm.map-missing")
 
 
 # --- tasks ----------------------------------------------------------------------------------------
@@ -214,7 +228,10 @@ def render(frames: list[int], output: str) -> None:
     check(frames)
     scene = bpy.context.scene
     if scene.render.is_movie_format:
-        raise Fault("The scene's format is a movie, which cannot be rendered in chunks: choose an image format.")
+        raise Fault(
+            "The scene's format is a movie, which cannot be rendered in chunks: choose an image format.",
+            code="farm.movie",
+        )
     if output:
         scene.render.filepath = output
     written: list[int] = []
@@ -231,7 +248,7 @@ def render(frames: list[int], output: str) -> None:
     bpy.app.handlers.render_write.remove(on_write)
     left = sorted(set(frames) - set(written))
     if left:
-        raise Fault(f"Frame {left[0]} was not written: the lines above say why.")
+        raise Fault(f"Frame {left[0]} was not written: the lines above say why.", code="farm.frame-not-written")
 
 
 def bake(frames: list[int], blender: str, file: str) -> None:
@@ -242,8 +259,11 @@ def bake(frames: list[int], blender: str, file: str) -> None:
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", errors="replace"
         )
     except OSError as error:
-        raise Fault(f"Blender could not be started as {blender} ({error.strerror}): name its executable.") from error
-    failure, done = "", 0
+        raise Fault(
+            f"Blender could not be started as {blender} ({error.strerror}): name its executable.",
+            code="farm.no-blender",
+        ) from error
+    failure, done = None, 0
     for line in process.stdout:
         print(line, end="", flush=True)
         text = line.strip()
@@ -252,10 +272,15 @@ def bake(frames: list[int], blender: str, file: str) -> None:
             done += 1
             tell("progress", f"{100.0 * done / len(frames):.1f}")
             tell("status", f"{match[1]}: {match[2]}")
-        elif text.startswith(COMMAND_FAILURE):
-            failure = text.removeprefix(COMMAND_FAILURE)
-    if process.wait() != 0:
-        raise Fault(failure or f"Baking ended with exit status {process.returncode}: the lines above say why.")
+        else:
+            failure = COMMAND_FAILURE.fullmatch(text) or failure
+    if process.wait() == 0:
+        return
+    if failure is not None:
+        raise Fault(failure[1], code=failure[2] or "farm.bake-failed")
+    raise Fault(
+        f"Baking ended with exit status {process.returncode}: the lines above say why.", code="farm.bake-failed"
+    )
 
 
 def main() -> None:
@@ -266,7 +291,7 @@ def main() -> None:
         frames = frames_of(options)
         if options.task == "bake":
             if not options.file:
-                raise Fault("Baking needs the .blend file: name it by --file.")
+                raise Fault("Baking needs the .blend file: name it by --file.", code="farm.no-file")
             bake(frames, options.blender, options.file)
         elif options.task == "render":
             render(frames, options.output)

@@ -48,7 +48,7 @@ def _requests_later(scene: bpy.types.Scene, view_layer_name: str | None) -> baki
     def requests(frame: int) -> list[MapRequest]:
         found = scene_of(uid)
         if found is None:
-            raise SceneError(f'Scene "{name}" is gone: baking has stopped.')
+            raise SceneError(f'Scene "{name}" is gone: baking has stopped.', code="map.scene-gone")
         return requests_at(found, frame, view_layer_name)
 
     return requests

@@ -33,7 +33,7 @@ def refresh_disk_or_warn(scene: bpy.types.Scene) -> None:
     try:
         refresh_disk(scene)
     except SceneError as error:
-        messages.warn(str(error))
+        messages.warn(error.for_user())
 
 
 def on_disk_changed(owner: bpy.types.ID) -> None:

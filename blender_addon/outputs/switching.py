@@ -33,7 +33,7 @@ def switch(scene: bpy.types.Scene, wanted: str) -> list[str]:
         If the scene cannot be rendered that way. It stays as it is.
     """
     if scene.library is not None:
-        raise SceneError(f'Scene "{scene.name}" is linked from another file: open that one.')
+        raise SceneError(f'Scene "{scene.name}" is linked from another file: open that one.', code="settings.linked")
     new, old = registry.get(wanted), installed(scene)
     new.check(scene)
     look = leaving.kept_look(scene) | look_of_scene(scene) | old.look(scene)
@@ -79,7 +79,7 @@ def on_setting_changed(owner: bpy.types.ID) -> None:
         for note in switch(owner, owner.umbra.output):
             messages.warn(note)
     except physics.BlackHoleError as error:
-        messages.warn(str(error))
-        messages.popup(str(error))
+        messages.warn(error.for_user())
+        messages.popup(error.for_user())
         with changes.muted(Change.OUTPUT):
             owner.umbra.output = installed(owner).identifier

@@ -177,7 +177,7 @@ def advance(budget: float) -> float | None:
             try:
                 _step(scene, now)
             except physics.BlackHoleError as error:  # the panel says it too
-                now.steps, now.problem, now.shown = None, str(error), None
+                now.steps, now.problem, now.shown = None, error.for_user(), None
                 _show_problem(scene)
             if time.perf_counter() >= end:
                 break

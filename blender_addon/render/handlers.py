@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 from ..bake import baking
 from ..bake import folder as map_folder
 from ..core import messages
-from ..core.errors import MapFolderError
+from ..core.errors import MapFolderError, SceneError, unexpected
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, refreshing, registry
@@ -54,14 +54,15 @@ def _guarded(work: Callable[[bpy.types.Scene], None], scene: bpy.types.Scene) ->
         work(scene)
     except physics.BlackHoleError as error:
         frame = f"Frame {scene.frame_current}: "
-        _fail(scene, str(error) if str(error).startswith(frame) else frame + str(error))
+        _fail(scene, error if str(error).startswith(frame) else SceneError(f"{frame}{error}", code=error.code))
     except Exception as error:  # noqa: BLE001  a fault of ours must not end as a wrong picture either
-        _fail(scene, f"An unexpected fault ({type(error).__name__}: {error}); please report it.")
+        _fail(scene, unexpected(error))
 
 
-def _fail(scene: bpy.types.Scene, text: str) -> None:
+def _fail(scene: bpy.types.Scene, error: "physics.BlackHoleError") -> None:
     now = _renders.of(scene)
     now.is_waiting = False
+    text = error.for_user()
     if messages.without_window():
         messages.end_process(text)
         return
@@ -106,7 +107,7 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
     if not output.is_in_use(scene):
         return
     if messages.is_ending():
-        messages.end_process("A frame before this one failed.")
+        messages.end_process(SceneError("A frame before this one failed.", code="render.frame-failed").for_user())
     _renders.of(scene).is_waiting = True
     _guarded(output.take_away, scene)
 
@@ -139,7 +140,8 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph |
 def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The frame is done."""
     if _renders.of(scene).is_waiting:
-        _fail(scene, f"Frame {scene.frame_current} was rendered without its warp map or lens.")
+        text = f"Frame {scene.frame_current} was rendered without its warp map or lens."
+        _fail(scene, SceneError(text, code="render.no-map"))
 
 
 @persistent
@@ -213,7 +215,7 @@ def on_save_pre(path: str = "", _unused: object = None) -> None:
         try:
             folder = map_folder.adopt(scene, Path(path)) if path and not bpy.data.filepath else None
         except MapFolderError as error:
-            messages.warn(str(error))
+            messages.warn(error.for_user())
             continue
         if folder is not None:
             output.move_maps(scene, folder)

@@ -64,19 +64,23 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
     if origin is None or origin.node.type != "TEX_COORD" or origin.name != "Generated":
         raise SceneError(
             "The World's Environment Texture takes its coordinates from something else than Texture "
-            f"Coordinate > Generated, with or without a Mapping node: {_HELP}."
+            f"Coordinate > Generated, with or without a Mapping node: {_HELP}.",
+            code="sky.coordinates",
         )
     if mapping is None:
         return (0.0, 0.0, 0.0), None
     inputs = mapping.inputs
     if any(each.is_linked for each in inputs if each.name != "Vector"):
-        raise SceneError(f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}.")
+        raise SceneError(
+            f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}.", code="sky.mapping"
+        )
     has_location = mapping.vector_type in {"POINT", "TEXTURE"}
     moves = has_location and any(inputs["Location"].default_value)
     if moves or tuple(inputs["Scale"].default_value) != (1.0, 1.0, 1.0):
         raise SceneError(
             "The World's Mapping node moves or scales the sky: only its Rotation can be taken over; set "
-            "Location to 0 and Scale to 1."
+            "Location to 0 and Scale to 1.",
+            code="sky.mapping",
         )
     rotation = Euler(inputs["Rotation"].default_value, "XYZ")
     if mapping.vector_type == "TEXTURE":
@@ -94,36 +98,50 @@ def read_world(scene: bpy.types.Scene) -> Sky:
     """
     world = scene.get(WORLD_BEFORE, scene.world)
     if world is None:
-        raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
+        )
     uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
     if not uses_nodes or world.node_tree is None:
-        raise SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.')
+        raise SceneError(
+            f'World "{world.name}" is a plain color and has no environment: {_HELP}.', code="sky.plain-color"
+        )
     engine = "CYCLES" if scene.render.engine == "CYCLES" else "EEVEE"
     output = world.node_tree.get_output_node(engine)
     surface = _source(output.inputs["Surface"]) if output is not None else None
     if surface is None or surface.node.type != "BACKGROUND":
-        raise SceneError(f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.')
+        raise SceneError(
+            f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.',
+            code="sky.no-background",
+        )
     background = surface.node
     color = _source(background.inputs["Color"])
     if color is None:
-        raise SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.')
+        raise SceneError(
+            f'World "{world.name}" is a plain color and has no environment: {_HELP}.', code="sky.plain-color"
+        )
     if color.node.type != "TEX_ENVIRONMENT":
         raise SceneError(
             f'World "{world.name}" makes its color with the node "{color.node.name}", which cannot be '
-            f"taken over: {_HELP}."
+            f"taken over: {_HELP}.",
+            code="sky.color-node",
         )
     if background.inputs["Strength"].is_linked:
         raise SceneError(
             f'The strength of World "{world.name}" is driven by other nodes, which cannot be followed: set '
-            "it as a number."
+            "it as a number.",
+            code="sky.strength",
         )
     texture = color.node
     if texture.image is None:
-        raise SceneError(f'The Environment Texture of World "{world.name}" has no image: choose one.')
+        raise SceneError(
+            f'The Environment Texture of World "{world.name}" has no image: choose one.', code="sky.no-image"
+        )
     if texture.projection != "EQUIRECTANGULAR":
         raise SceneError(
             f'The Environment Texture of World "{world.name}" is a mirror ball: only Equirectangular images '
-            "can be taken over."
+            "can be taken over.",
+            code="sky.mirror-ball",
         )
     rotation, rotation_path = _mapping(texture)
     strength, strength_path = background.inputs["Strength"].default_value, _input_path(background, "Strength")
@@ -160,7 +178,9 @@ def read(scene: bpy.types.Scene) -> Sky:
     if settings.environment_source == "WORLD":
         return read_world(scene)
     if settings.environment_image is None:
-        raise SceneError("There is no environment: choose a sky image in the Umbra panel, or Sky: World.")
+        raise SceneError(
+            "There is no environment: choose a sky image in the Umbra panel, or Sky: World.", code="sky.no-image"
+        )
     return Sky(image=settings.environment_image)
 
 
@@ -176,7 +196,10 @@ def check_image(image: bpy.types.Image) -> None:
         return
     if image.source == "FILE" and min(image.size) <= 0:
         path = bpy.path.abspath(image.filepath, library=image.library)
-        raise SceneError(f'The sky image "{image.name}" cannot be loaded from {path}: choose a file that exists.')
+        raise SceneError(
+            f'The sky image "{image.name}" cannot be loaded from {path}: choose a file that exists.',
+            code="sky.image-missing",
+        )
 
 
 # --- the built-in sky -----------------------------------------------------------------------------

@@ -108,15 +108,18 @@ def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
         raise SceneError(
             f'The black hole "{chosen.name}" is no longer in scene "{scene.name}": choose another one in the '
             "Umbra panel, add one with Add > Black Hole, or take the compositor set-up out with Remove from "
-            "Compositor."
+            "Compositor.",
+            code="hole.gone",
         )
     if holes(scene):
         raise SceneError(
-            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is rendered.'
+            f'Scene "{scene.name}" contains several black holes: choose in the Umbra panel which one is rendered.',
+            code="hole.several",
         )
     raise SceneError(
         f'Scene "{scene.name}" contains no black hole: add one with Add > Black Hole, or take the compositor '
-        "set-up out with Remove from Compositor."
+        "set-up out with Remove from Compositor.",
+        code="hole.none",
     )
 
 
@@ -127,13 +130,15 @@ def _check_evaluated(hole: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
         where = "renders" if rendering else "viewports"
         raise SceneError(
             f'The black hole "{hole.name}" is disabled in {where}, so Blender does not move it: enable it in '
-            "the Outliner, or take the compositor set-up out with Remove from Compositor."
+            "the Outliner, or take the compositor set-up out with Remove from Compositor.",
+            code="hole.disabled",
         )
     layer = depsgraph.view_layer
     if layer.objects.get(hole.name) is None:
         raise SceneError(
             f'The black hole "{hole.name}" is in a collection that view layer "{layer.name}" excludes, so '
-            "Blender does not move it: include that collection."
+            "Blender does not move it: include that collection.",
+            code="hole.excluded",
         )
 
 
@@ -160,19 +165,27 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
-        raise SceneError(f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.')
+        raise SceneError(
+            f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.',
+            code="hole.scale-zero",
+        )
     if keep_scale and lengths.max() - lengths.min() > MATRIX_TOLERANCE * lengths.max():
         raise SceneError(
             f'{what} "{evaluated.name}" has a different scale along x, y and z: make all three the same (its '
-            "parents' scales count too)."
+            "parents' scales count too).",
+            code="hole.scale-uneven",
         )
     axes = matrix[:3, :3] / lengths
     if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
         raise SceneError(
-            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.'
+            f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.',
+            code="hole.scale-uneven",
         )
     if np.linalg.det(axes) < 0.0:
-        raise SceneError(f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.')
+        raise SceneError(
+            f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.',
+            code="hole.scale-negative",
+        )
     # the nearest rotation, free of float32's rounding
     left, _, right = np.linalg.svd(axes)
     return Pose(matrix[:3, 3], left @ right, float(lengths.mean()))
@@ -234,12 +247,14 @@ def check_render(render: bpy.types.RenderSettings, traits: Traits = PLAIN) -> No
     if render.use_border and render.use_crop_to_border and not traits.crops:
         raise SceneError(
             "Crop to Render Region is not supported with a black hole in the compositor: switch it off in Output "
-            "Properties > Format (the render region itself works), or choose Output: Cycles Lens."
+            "Properties > Format (the render region itself works), or choose Output: Cycles Lens.",
+            code="camera.crop",
         )
     if render.use_multiview:
         raise SceneError(
             "Stereoscopy is not supported with a black hole: switch it off in Output Properties, or render "
-            "each eye as a camera of its own."
+            "each eye as a camera of its own.",
+            code="camera.stereo",
         )
 
 
@@ -281,23 +296,27 @@ def camera_model(
         if kind != "EQUIRECTANGULAR":
             raise SceneError(
                 f'Camera "{camera.name}" is a panorama of type {str(kind).replace("_", " ").title()}: only '
-                "Equirectangular panoramas can show a black hole; choose that, or a perspective camera."
+                "Equirectangular panoramas can show a black hole; choose that, or a perspective camera.",
+                code="camera.type",
             )
         if engine != "CYCLES":
             raise SceneError(
                 f'Camera "{camera.name}" is a panorama, which only Cycles renders: choose Cycles, or a '
-                "perspective camera."
+                "perspective camera.",
+                code="camera.panorama-engine",
             )
         limits = ("latitude_min", "latitude_max", "longitude_min", "longitude_max")
         return physics.PanoramaCamera(width, height, **{name: _panorama_setting(camera, name) for name in limits})
     if kind_of_lens == "ORTHO":
         raise SceneError(
             f'Camera "{camera.name}" is orthographic: a black hole needs a place to be seen from; make the '
-            "camera perspective."
+            "camera perspective.",
+            code="camera.orthographic",
         )
     raise SceneError(
         f'Camera "{camera.name}" is of type {camera.type.title()}, which cannot show a black hole: make it '
-        "perspective or an equirectangular panorama."
+        "perspective or an equirectangular panorama.",
+        code="camera.type",
     )
 
 
@@ -344,7 +363,10 @@ def read(
     _check_evaluated(hole, depsgraph)
     camera = scene.camera
     if camera is None or camera.type != "CAMERA":
-        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
+            code="camera.none",
+        )
 
     evaluated_hole = hole.evaluated_get(depsgraph)
     evaluated_camera = camera.evaluated_get(depsgraph)
@@ -364,7 +386,8 @@ def read(
             raise SceneError(
                 f'Frame {scene.frame_current}: camera "{camera.name}" moves at {np.linalg.norm(speed):.3g} '
                 "times the speed of light; slow its animation down, or raise the black hole's Speed of Light "
-                f"above {np.linalg.norm(velocity):.4g} scene units a second."
+                f"above {np.linalg.norm(velocity):.4g} scene units a second.",
+                code="camera.too-fast",
             )
 
     settings = scene.umbra

@@ -47,7 +47,7 @@ def check_frame(
     wanted = registry.of(scene).request_to_check(scene, frame)
     fault = fault_of(wanted)
     if fault is not None:
-        raise SceneError(f"{fault}: press Bake This Frame first.")
+        raise SceneError(f"{fault}: press Bake This Frame first.", code="map.out-of-date")
     steps = accuracy.accuracy_steps(
         wanted.path, passes=list(wanted.passes), environment_width=_environment_width(scene)
     )

@@ -55,7 +55,9 @@ class BakeOperator:
         scene = context.scene
         frame_setup.active_hole(scene)
         if not registry.of(scene).needs_maps(scene):
-            raise SceneError("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
+            raise SceneError(
+                "The lens traces its rays itself (Rays: No Bake): there is nothing to bake.", code="lens.no-maps"
+            )
         if len(frame_setup.holes(scene)) > 1 and scene.umbra.active_hole is not None:
             self.report({"WARNING"}, only_one_is_rendered(scene))
         return self.work(context)
@@ -99,7 +101,7 @@ class BakeOperator:
             self._report(end.value)
             return self._end(context, {"FINISHED"})
         except physics.BlackHoleError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, error.for_user())
             return self._end(context, {"CANCELLED"})
         except Exception:
             self._end(context, {"CANCELLED"})

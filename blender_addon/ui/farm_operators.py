@@ -7,7 +7,6 @@ from time import perf_counter
 
 import bpy
 
-from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..farm import farm_copy, farm_templates
 from .reporting import TIMER_INTERVAL, reporting
@@ -56,7 +55,7 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
             try:
                 result = self._go_on(self._steps, context)
             except physics.BlackHoleError as error:
-                self.report({"ERROR"}, str(error))
+                self.report({"ERROR"}, error.for_user())
                 return self._end(context, {"CANCELLED"})
             except Exception:
                 self._end(context, {"CANCELLED"})
@@ -116,8 +115,9 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         if farm_copy.needs_copy(scene):
             try:
                 bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
-            except RuntimeError as error:  # what the other operator has reported
-                raise SceneError(str(error).removeprefix("Error: ").strip()) from error
+            except RuntimeError as error:  # what the other operator has reported, with its code
+                self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+                return {"CANCELLED"}
         return {"FINISHED"}
 
 

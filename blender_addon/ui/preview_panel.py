@@ -29,7 +29,9 @@ class UMBRA_OT_toggle_lensing(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         socket = lensing(context.scene)
         if socket is None or socket.is_linked:
-            raise SceneError("The input Lensing of the World's group is linked: switch it there.")
+            raise SceneError(
+                "The input Lensing of the World's group is linked: switch it there.", code="sky.lensing-linked"
+            )
         socket.default_value = 0.0 if socket.default_value > world_nodes.ON else 1.0
         return {"FINISHED"}
 

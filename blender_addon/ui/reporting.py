@@ -13,14 +13,14 @@ TIMER_INTERVAL = 0.02  # seconds between steps of work that runs beside the inte
 
 
 def reporting(execute: Callable) -> Callable:
-    """Turn the sentences of errors into the operator's report."""
+    """Turn errors into the operator's report: the sentence and the code."""
 
     @wraps(execute)
     def guarded(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
         try:
             return execute(self, context)
         except physics.BlackHoleError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, error.for_user())
             return {"CANCELLED"}
 
     return guarded

@@ -59,7 +59,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
         now = frames.read(scene, depsgraph, np.zeros(3))
         notices = registry.of(scene).notices(scene, depsgraph, now)
     except physics.BlackHoleError as error:
-        return wrapped(str(error), "ERROR")
+        return wrapped(error.for_user(), "ERROR")
     found: list[Line] = []
     for notice in notices:
         found += wrapped(notice.text, notice.icon)

@@ -148,10 +148,14 @@ def accuracy_steps(
     """
     if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
         raise BlackHoleError(
-            f"The number of samples is {samples}; give it a value between {FEWEST_SAMPLES} and {MOST_SAMPLES}."
+            f"The number of samples is {samples}; give it a value between {FEWEST_SAMPLES} and {MOST_SAMPLES}.",
+            code="settings.range",
         )
     if not environment_width >= 1:
-        raise BlackHoleError(f"The environment's width is {environment_width}; it must be at least 1 pixel.")
+        raise BlackHoleError(
+            f"The environment's width is {environment_width}; it must be at least 1 pixel.",
+            code="settings.range",
+        )
     pixels = _read(path)
     pixels.parameters.validate()
     disk = [_read_pass(each, path, pixels.parameters) for each in passes]
@@ -203,7 +207,7 @@ def _read(path: PathLike) -> _Pixels:
 def _read_pass(path: PathLike, map_path: PathLike, parameters: WarpMapParameters) -> DiskPass:
     one = read_disk_pass(path)
     if one.metadata["hash"] != parameters.hash:
-        raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.")
+        raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.", code="map.passes-mixed")
     return one
 
 

@@ -66,11 +66,15 @@ def run(options: argparse.Namespace) -> None:
         If no map can be made from the options, or a file cannot be written.
     """
     if options.output.suffix.lower() != ".exr":
-        raise BlackHoleError(f"{options.output} does not end in .exr; warp maps are OpenEXR files.")
+        raise BlackHoleError(
+            f"{options.output} does not end in .exr; warp maps are OpenEXR files.", code="command.file-name"
+        )
     if options.output.is_dir():
-        raise BlackHoleError(f"{options.output} is a folder; give the name of a file.")
+        raise BlackHoleError(f"{options.output} is a folder; give the name of a file.", code="command.file-name")
     if not 0.0 <= options.inclination <= 180.0:
-        raise BlackHoleError(f"The inclination is {options.inclination:g} degrees; give 0 to 180.")
+        raise BlackHoleError(
+            f"The inclination is {options.inclination:g} degrees; give 0 to 180.", code="settings.range"
+        )
     camera: Camera
     if options.panorama:
         camera = PanoramaCamera(options.width, options.height)
@@ -83,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
         options.radius * math.cos(theta),
     )
     if not options.radius > 0.0:
-        raise BlackHoleError(f"The radius is {options.radius:g} M; it must be positive.")
+        raise BlackHoleError(f"The radius is {options.radius:g} M; it must be positive.", code="settings.range")
     parameters = WarpMapParameters(
         spin=options.spin,
         camera=camera,

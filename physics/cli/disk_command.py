@@ -55,7 +55,7 @@ def disk_of(options: argparse.Namespace) -> Disk | None:
         if (value := getattr(options, f"disk_{option}", None)) is not None
     }
     if given and not options.disk:
-        raise BlackHoleError("The disk's settings are given without the disk; add --disk.")
+        raise BlackHoleError("The disk's settings are given without the disk; add --disk.", code="command.no-disk")
     return Disk(**given) if options.disk else None
 
 

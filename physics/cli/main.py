@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options.run(options)
     except BlackHoleError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {error.for_user()}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("\ncanceled: nothing was written", file=sys.stderr)

@@ -54,9 +54,11 @@ def run(options: argparse.Namespace) -> None:
         If the options cannot be used, or a file cannot be read or written.
     """
     if options.output.suffix.lower() not in PICTURE_ENDINGS:
-        raise BlackHoleError(f"{options.output} must end in {' or '.join(PICTURE_ENDINGS)}.")
+        raise BlackHoleError(f"{options.output} must end in {' or '.join(PICTURE_ENDINGS)}.", code="command.file-name")
     if not options.temperature > 0.0:
-        raise BlackHoleError(f"The temperature is {options.temperature:g} K; it must be positive.")
+        raise BlackHoleError(
+            f"The temperature is {options.temperature:g} K; it must be positive.", code="sky.temperature"
+        )
     warp_map = read_warp_map(options.map)
     camera = warp_map.metadata["parameters"]["camera"]
     environment, _ = read_exr(options.sky)

@@ -49,7 +49,9 @@ def run(options: argparse.Namespace) -> None:
     print(", ".join(f"{count} {state}" for state, count in counts.items()) or "no maps")
     faulty = counts.total() - counts[State.VALID]
     if faulty:
-        raise BlackHoleError(f"{faulty} of {counts.total()} files do not hold; bake them again.")
+        raise BlackHoleError(
+            f"{faulty} of {counts.total()} files do not hold; bake them again.", code="command.faulty-maps"
+        )
 
 
 def check_file(path: Path) -> Finding:

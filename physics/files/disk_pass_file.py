@@ -123,13 +123,13 @@ def read_disk_passes(map_path: PathLike, warp_map: WarpMap) -> list[DiskPass]:
     """
     disk = warp_map.metadata["parameters"].get("disk")
     if not disk:
-        raise BlackHoleError(f"{map_path} was baked without a disk; bake it again with --disk.")
+        raise BlackHoleError(f"{map_path} was baked without a disk; bake it again with --disk.", code="map.no-disk")
     passes = []
     for crossing in range(1, disk["crossings"] + 1):
         path = find_pass(map_path, crossing)
         one = read_disk_pass(path)
         if one.metadata["hash"] != warp_map.metadata["hash"] or one.metadata["crossing"] != crossing:
-            raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.")
+            raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.", code="map.passes-mixed")
         passes.append(one)
     return passes
 
@@ -181,5 +181,5 @@ def read_disk_pass(path: PathLike) -> DiskPass:
         and (g[seen] > 0.0).all()
     )
     if not (fits and disk and crossing.isdigit() and 1 <= int(crossing) <= disk["crossings"]):
-        raise WarpMapError(advice(f"{path} is damaged: it holds values that no disk pass has."))
+        raise WarpMapError(advice(f"{path} is damaged: it holds values that no disk pass has."), code="map.damaged")
     return DiskPass(radius, phi, g, coverage, {**metadata, "crossing": int(crossing)})

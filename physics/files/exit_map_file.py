@@ -78,7 +78,7 @@ def read_exit_map(path: PathLike) -> ExitMap:
         and (np.abs(length[result.usable == 1.0] - 1.0) < UNIT_TOLERANCE).all()
     )
     if not fits:
-        raise WarpMapError(advice(f"{path} is damaged: it holds values that no exit map has."))
+        raise WarpMapError(advice(f"{path} is damaged: it holds values that no exit map has."), code="map.damaged")
     return result
 
 

@@ -105,11 +105,13 @@ class MapFormat:
         try:
             channels, header = read_channels(path)
         except ImageFileError as error:
-            raise WarpMapError(advice(str(error))) from error
+            raise WarpMapError(advice(str(error)), code=error.code) from error
         metadata = self._metadata(path, header)
         planes = [channels[name] for name in CHANNELS if name in channels]
         if len(planes) != len(CHANNELS) or checksum(planes) != header.get(ATTRIBUTE_CHECKSUM):
-            raise WarpMapError(advice(f"{path} is damaged: its pixels are not those that were written."))
+            raise WarpMapError(
+                advice(f"{path} is damaged: its pixels are not those that were written."), code="map.damaged"
+            )
         return planes, metadata
 
     def read_metadata(self, path: PathLike) -> dict[str, Any]:
@@ -132,15 +134,17 @@ class MapFormat:
         try:
             header = read_exr_header(path)
         except ImageFileError as error:
-            raise WarpMapError(advice(str(error))) from error
+            raise WarpMapError(advice(str(error)), code=error.code) from error
         return self._metadata(path, header)
 
     def _metadata(self, path: PathLike, header: Mapping[str, Any]) -> dict[str, Any]:
         stamp = header.get(ATTRIBUTE_FORMAT)
         if not isinstance(stamp, str) or not stamp.startswith(self.name + " "):
-            raise WarpMapError(advice(f"{Path(path)} is not {self.noun}."))
+            raise WarpMapError(advice(f"{Path(path)} is not {self.noun}."), code="map.other-kind")
         if stamp != self.stamp:
-            raise WarpMapError(advice(f"{Path(path)} is {self.noun} of another version ({stamp})."))
+            raise WarpMapError(
+                advice(f"{Path(path)} is {self.noun} of another version ({stamp})."), code="map.other-version"
+            )
         try:
             parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
             counts = json.loads(header[ATTRIBUTE_COUNTS])
@@ -148,11 +152,15 @@ class MapFormat:
             readable = isinstance(counts["unresolved"], int) and all(type(each) is int for each in counts.values())
             identity = str(header[ATTRIBUTE_HASH])
         except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read.")) from error
+            raise WarpMapError(
+                advice(f"{Path(path)} is damaged: its header cannot be read."), code="map.damaged"
+            ) from error
         if not readable:
-            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read."))
+            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read."), code="map.damaged")
         if list(header["size"]) != [width, height * self.pictures]:
-            raise WarpMapError(advice(f"{Path(path)} is damaged: its size is not that of its parameters."))
+            raise WarpMapError(
+                advice(f"{Path(path)} is damaged: its size is not that of its parameters."), code="map.damaged"
+            )
         further = {name: str(header.get(name, "")) for name in self.attributes}
         return {"format": stamp, "hash": identity, "counts": counts, "parameters": parameters, **further}
 

@@ -94,4 +94,6 @@ def _check_ranges(path: PathLike, *planes: NDArray[np.float32]) -> None:
         and ((visibility >= 0.0) & (visibility <= 1.0)).all()
     )
     if not fits:
-        raise WarpMapError(advice(f"{Path(path)} is damaged: it holds values that no warp map has."))
+        raise WarpMapError(
+            advice(f"{Path(path)} is damaged: it holds values that no warp map has."), code="map.damaged"
+        )

@@ -70,7 +70,7 @@ def read_world_map(path: PathLike) -> WorldMap:
         and texture[0, 4 * (texture.shape[1] // HEADER_PARTS), 1] == STAMP
     )
     if not fits:
-        raise WarpMapError(advice(f"{path} is damaged: it holds values that no world map has."))
+        raise WarpMapError(advice(f"{path} is damaged: it holds values that no world map has."), code="map.damaged")
     return WorldMap(texture, metadata)
 
 

@@ -175,9 +175,14 @@ def check_disk_settings(crossings: int, method: str) -> None:
     """
     crossings = whole(crossings, "the number of crossings")
     if not 1 <= crossings <= MOST_CROSSINGS:
-        raise BlackHoleError(f"The number of crossings is {crossings}; give it a value between 1 and {MOST_CROSSINGS}.")
+        raise BlackHoleError(
+            f"The number of crossings is {crossings}; give it a value between 1 and {MOST_CROSSINGS}.",
+            code="disk.setting",
+        )
     if method not in DISK_METHODS:
-        raise BlackHoleError(f"The method '{method}' knows no disk; choose one of {', '.join(DISK_METHODS)}.")
+        raise BlackHoleError(
+            f"The method '{method}' knows no disk; choose one of {', '.join(DISK_METHODS)}.", code="settings.method"
+        )
 
 
 def disk_crossings(

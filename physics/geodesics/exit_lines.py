@@ -88,7 +88,8 @@ def check_exit_method(method: str) -> None:
     if method not in EXIT_METHODS:
         raise BlackHoleError(
             f"The method '{method}' gives directions alone and cannot tell where rays leave: choose one of "
-            f"{', '.join(EXIT_METHODS)}."
+            f"{', '.join(EXIT_METHODS)}.",
+            code="settings.method",
         )
 
 

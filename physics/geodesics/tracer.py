@@ -311,9 +311,13 @@ def viewing_angles(theta_rd: ArrayLike, phi_rd: ArrayLike) -> tuple[Array, Array
     try:
         theta, phi = np.broadcast_arrays(np.asarray(theta_rd, np.float64), np.asarray(phi_rd, np.float64))
     except (TypeError, ValueError, OverflowError) as error:
-        raise BlackHoleError("theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.") from error
+        raise BlackHoleError(
+            "theta_rd and phi_rd must be numbers, of one shape or shapes that broadcast.", code="settings.array"
+        ) from error
     if not (np.isfinite(theta).all() and np.isfinite(phi).all()):
-        raise BlackHoleError("The viewing directions theta_rd and phi_rd must all be finite numbers.")
+        raise BlackHoleError(
+            "The viewing directions theta_rd and phi_rd must all be finite numbers.", code="settings.array"
+        )
     return theta, phi
 
 
@@ -334,12 +338,15 @@ def check_settings(tolerance: float, method: str, max_steps: int = DEFAULT_MAX_S
     if not SMALLEST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
         raise BlackHoleError(
             f"The tolerance is {tolerance:g}; give it a value between {SMALLEST_TOLERANCE:g} and "
-            f"{LARGEST_TOLERANCE:g} radians."
+            f"{LARGEST_TOLERANCE:g} radians.",
+            code="settings.range",
         )
     if not isinstance(method, str) or method not in METHODS:
-        raise BlackHoleError(f"There is no method {shown(method)}; choose one of {', '.join(METHODS)}.")
+        raise BlackHoleError(
+            f"There is no method {shown(method)}; choose one of {', '.join(METHODS)}.", code="settings.choice"
+        )
     if max_steps < 1:
-        raise BlackHoleError(f"The number of steps is {max_steps}; it must be at least 1.")
+        raise BlackHoleError(f"The number of steps is {max_steps}; it must be at least 1.", code="settings.range")
 
 
 def last(rounds: Iterator[Integration | None]) -> Integration:

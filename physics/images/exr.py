@@ -106,7 +106,9 @@ def replacing(path: PathLike) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
         os.close(handle)
     except OSError as error:
-        raise ImageFileError(f"Cannot write {target}: {_reason(error)}; choose another folder.") from error
+        raise ImageFileError(
+            f"Cannot write {target}: {_reason(error)}; choose another folder.", code="file.not-written"
+        ) from error
     temporary = Path(name)
     try:
         yield temporary
@@ -117,7 +119,8 @@ def replacing(path: PathLike) -> Iterator[Path]:
         os.replace(temporary, target)
     except OSError as error:
         raise ImageFileError(
-            f"Cannot write {target}: {_reason(error)}; free some space or choose another folder."
+            f"Cannot write {target}: {_reason(error)}; free some space or choose another folder.",
+            code="file.not-written",
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
@@ -212,7 +215,9 @@ def read_exr(path: PathLike) -> tuple[NDArray[np.float32], dict[str, Any]]:
         channels = dict.fromkeys("RGB", channels["Y"]) | {k: v for k, v in channels.items() if k == "A"}
     names = [name for name in "RGBA" if name in channels]
     if names[:3] != ["R", "G", "B"]:
-        raise ImageFileError(f"{path} has no channels R, G and B; it is not a picture that can be used here.")
+        raise ImageFileError(
+            f"{path} has no channels R, G and B; it is not a picture that can be used here.", code="file.no-colors"
+        )
     return np.stack([np.asarray(channels[name], dtype=np.float32) for name in names], axis=-1), header
 
 
@@ -258,11 +263,11 @@ def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
             stream.seek(0)
             exr_header.check(stream, size, whole=not header_only)
     except FileNotFoundError as error:
-        raise ImageFileError(f"{path} does not exist.") from error
+        raise ImageFileError(f"{path} does not exist.", code="file.missing") from error
     except OSError as error:
-        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.") from error
+        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.", code="file.no-access") from error
     except exr_header.BadHeader as error:
-        raise ImageFileError(f"{path} {error}.") from error
+        raise ImageFileError(f"{path} {error}.", code="file.bad-exr") from error
     try:
         source: Any = str(path) if data is None else io.BytesIO(data)
         with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:
@@ -271,7 +276,7 @@ def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
         if isinstance(error, ImageFileError):
             raise
         detail = str(error).strip() or type(error).__name__
-        raise ImageFileError(f"{path} is damaged or cut short: {detail}.") from error
+        raise ImageFileError(f"{path} is damaged or cut short: {detail}.", code="file.bad-exr") from error
 
 
 def _attributes(file: OpenEXR.File) -> dict[str, Any]:

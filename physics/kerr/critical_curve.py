@@ -289,7 +289,8 @@ def spherical_orbit(spin: float, radius: ArrayLike) -> tuple[Array, Array]:
     a = check_spin(spin)
     if a == 0.0:
         raise BlackHoleError(
-            "Eq. 9 divides by the spin: without spin every spherical photon orbit has r = 3 and b^2 + q = 27."
+            "Eq. 9 divides by the spin: without spin every spherical photon orbit has r = 3 and b^2 + q = 27.",
+            code="settings.range",
         )
     r = np.asarray(radius, dtype=np.float64)
     b0 = -(r**3 - 3.0 * r**2 + a * a * r + a * a) / (a * (r - 1.0))
@@ -370,7 +371,10 @@ def critical_carter_constant(spin: float, b: ArrayLike) -> Array:
     b = np.asarray(b, dtype=np.float64)
     low, high = critical_impact_parameters(a)
     if np.any((b < low) | (b > high)):
-        raise BlackHoleError(f"Spherical photon orbits have impact parameters between {low:.6g} and {high:.6g} only.")
+        raise BlackHoleError(
+            f"Spherical photon orbits have impact parameters between {low:.6g} and {high:.6g} only.",
+            code="settings.range",
+        )
     linear, constant = a * a + a * b - 3.0, 2.0 * (a * a - 1.0)
     # The constant is negative, so there is one positive root and the cubic is convex to its right: Newton's method
     # from above the root comes down to it without leaving the right side of the asymptote r_0 = 1.

@@ -44,7 +44,7 @@ def check_spin(spin: float) -> float:
     """
     spin = number(spin, "the spin")
     if not -1.0 < spin < 1.0:  # also catches NaN
-        raise BlackHoleError(f"The spin is {spin:g}; give it a value above -1 and below 1.")
+        raise BlackHoleError(f"The spin is {spin:g}; give it a value above -1 and below 1.", code="hole.spin")
     return spin
 
 
@@ -70,13 +70,16 @@ def metric_functions(spin: float, r: float, theta: float) -> MetricFunctions:
     """
     horizon = horizon_radius(spin)
     if not r <= LARGEST_RADIUS:
-        raise BlackHoleError(f"The distance from the hole is {r:g} M; it must be at most {LARGEST_RADIUS:g} M.")
+        raise BlackHoleError(
+            f"The distance from the hole is {r:g} M; it must be at most {LARGEST_RADIUS:g} M.", code="camera.position"
+        )
     if not math.isfinite(theta):
-        raise BlackHoleError(f"The polar angle is {theta:g}; it must be a finite number.")
+        raise BlackHoleError(f"The polar angle is {theta:g}; it must be a finite number.", code="camera.position")
     if not r > horizon:
         raise BlackHoleError(
             f"The camera is inside the black hole: its distance is {r:.4g} M and the horizon lies at "
-            f"{horizon:.4g} M; move the camera away from the hole or make the hole smaller."
+            f"{horizon:.4g} M; move the camera away from the hole or make the hole smaller.",
+            code="camera.inside-hole",
         )
     sin_theta = axis_safe_sin(theta)
     a2 = spin * spin

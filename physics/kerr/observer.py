@@ -61,18 +61,26 @@ class Observer:
             object.__setattr__(self, name, finite(getattr(self, name), f"the observer's {what}"))
         object.__setattr__(self, "direction", vector(self.direction, "the direction of motion"))
         if not all(math.isfinite(component) for component in self.direction):
-            raise BlackHoleError("The direction of motion must be three finite numbers.")
+            raise BlackHoleError("The direction of motion must be three finite numbers.", code="camera.position")
         if not 0.0 < self.r <= LARGEST_RADIUS:
             raise BlackHoleError(
-                f"The observer's radius is {self.r:g}; it must be positive and at most {LARGEST_RADIUS:g} M."
+                f"The observer's radius is {self.r:g}; it must be positive and at most {LARGEST_RADIUS:g} M.",
+                code="camera.position",
             )
         if not 0.0 <= self.theta <= math.pi:
-            raise BlackHoleError(f"The observer's theta is {self.theta:g}; it must lie between 0 and pi.")
+            raise BlackHoleError(
+                f"The observer's theta is {self.theta:g}; it must lie between 0 and pi.", code="camera.position"
+            )
         if not 0.0 <= self.beta < 1.0:
-            raise BlackHoleError(f"The observer's speed is {self.beta:g} times the speed of light; it must be below 1.")
+            raise BlackHoleError(
+                f"The observer's speed is {self.beta:g} times the speed of light; it must be below 1.",
+                code="camera.too-fast",
+            )
         norm = math.sqrt(sum(component * component for component in self.direction))
         if abs(norm - 1.0) > UNIT_TOLERANCE:
-            raise BlackHoleError(f"The direction of motion {tuple(self.direction)} is not a unit vector.")
+            raise BlackHoleError(
+                f"The direction of motion {tuple(self.direction)} is not a unit vector.", code="camera.position"
+            )
         unit = tuple(float(component) / norm for component in self.direction)
         object.__setattr__(self, "direction", unit)
 
@@ -121,7 +129,8 @@ class Observer:
         if not r > limit:
             raise BlackHoleError(
                 f"Nothing can be at rest against the stars inside the ergosphere: here it reaches to "
-                f"{limit:.4g} M and the camera is at {r:.4g} M; move the camera out or let it move as a FIDO."
+                f"{limit:.4g} M and the camera is at {r:.4g} M; move the camera out or let it move as a FIDO.",
+                code="camera.ergosphere",
             )
         return cls._rotating(r, theta, phi, -metric.varpi * metric.omega / metric.alpha)
 
@@ -155,7 +164,8 @@ class Observer:
         if not r > limit:
             raise BlackHoleError(
                 f"There is no circular orbit at {r:.4g} M: the {_sense(prograde)} photon orbit, where it would "
-                f"take the speed of light, lies at {limit:.4g} M; move the camera out."
+                f"take the speed of light, lies at {limit:.4g} M; move the camera out.",
+                code="camera.no-orbit",
             )
         isco = isco_radius(spin, prograde)
         if r < isco:
@@ -203,7 +213,8 @@ class Observer:
             raise BlackHoleError(
                 f"An orbit at {r:.4g} M would need {abs(speed):.3g} times the speed of light "
                 f"(the {_sense(prograde)} photon orbit lies at {photon_orbit_radius(spin, prograde):.4g} M); "
-                f"move the camera out."
+                f"move the camera out.",
+                code="camera.no-orbit",
             )
         return cls._rotating(r, theta, phi, speed)
 

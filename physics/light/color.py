@@ -100,15 +100,20 @@ def redshift_gain(
     ratio: NDArray[np.float64] = np.asarray(one_plus_z, dtype=np.float64)
     shift = ratio[..., np.newaxis]
     if not np.all((shift > 0.0) & (shift >= 1.0 / LARGEST_SHIFT) & (shift <= LARGEST_SHIFT)):
-        raise BlackHoleError("1 + z must be positive everywhere: give the frequency ratio source / camera.")
+        raise BlackHoleError(
+            "1 + z must be positive everywhere: give the frequency ratio source / camera.", code="settings.range"
+        )
     temperature = number(temperature, "the sky's temperature")
     if not COLDEST <= temperature <= HOTTEST:
         raise BlackHoleError(
-            f"The sky's temperature is {temperature:g} K, it must be positive, from {COLDEST:g} to {HOTTEST:g} K."
+            f"The sky's temperature is {temperature:g} K, it must be positive, from {COLDEST:g} to {HOTTEST:g} K.",
+            code="sky.temperature",
         )
     for amount in (color_amount, brightness_amount):
         if not abs(number(amount, "an amount of redshift")) <= LARGEST_AMOUNT:
-            raise BlackHoleError(f"An amount of redshift is {amount:g}; give it a value from 0 to 1.")
+            raise BlackHoleError(
+                f"An amount of redshift is {amount:g}; give it a value from 0 to 1.", code="settings.range"
+            )
     wavelengths: NDArray[np.float64] = np.asarray(CHANNEL_WAVELENGTHS, dtype=np.float64)
     x = SECOND_RADIATION_CONSTANT / (wavelengths * temperature)
     planck_ratio_log = _log_of_exp_minus_one(x) - _log_of_exp_minus_one(x * shift)

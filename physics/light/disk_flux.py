@@ -107,9 +107,15 @@ def relative_flux(
     """
     r = np.asarray(radius, dtype=np.float64)
     if not isinstance(profile, str):
-        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
+        raise BlackHoleError(
+            f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.",
+            code="settings.choice",
+        )
     if profile == "power_law":
         return np.minimum(inner / r, 1.0) ** exponent
     if profile != "novikov_thorne":
-        raise BlackHoleError(f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.")
+        raise BlackHoleError(
+            f"There is no temperature profile {shown(profile)}; choose one of {', '.join(PROFILES)}.",
+            code="settings.choice",
+        )
     return page_thorne_flux(spin, r, retrograde) / peak_flux(spin, retrograde)

@@ -85,18 +85,23 @@ class DiskLook:
                 finite(getattr(self, field.name), f"the disk's {field.name.replace('_', ' ')}")
         relative_flux(self.profile, 0.0, 10.0, 6.0)
         if self.beaming not in (BOLOMETRIC, MONOCHROMATIC):
-            raise BlackHoleError(f"The power of g in the brightness is {self.beaming}; choose 4 or 3.")
+            raise BlackHoleError(
+                f"The power of g in the brightness is {self.beaming}; choose 4 or 3.", code="disk.setting"
+            )
         if not COLDEST <= self.temperature <= HOTTEST:
             raise BlackHoleError(
                 f"The disk's temperature is {self.temperature:g} K; give it a value between {COLDEST:g} and "
-                f"{HOTTEST:g} K."
+                f"{HOTTEST:g} K.",
+                code="disk.setting",
             )
         for field in dataclasses.fields(self):
             low, high = RANGES.get(field.name, (-math.inf, math.inf))
             value = getattr(self, field.name)
             if field.name in RANGES and not low <= value <= high:
                 raise BlackHoleError(
-                    f"The disk's {field.name.replace('_', ' ')} is {value:g}; give it a value from {low:g} to {high:g}."
+                    f"The disk's {field.name.replace('_', ' ')} is {value:g}; give it a value from {low:g} to "
+                    f"{high:g}.",
+                    code="disk.setting",
                 )
 
 

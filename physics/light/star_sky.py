@@ -70,7 +70,7 @@ def load_stars(magnitude_limit: float = FAINTEST) -> Stars:
         If the limit is not a number.
     """
     if math.isnan(magnitude_limit):
-        raise BlackHoleError("The magnitude limit is not a number; give one between -1 and 8.")
+        raise BlackHoleError("The magnitude limit is not a number; give one between -1 and 8.", code="settings.range")
     with np.load(CATALOG) as file:
         columns = {name: file[name].astype(np.float64) for name in ("ra_deg", "dec_deg", "v_mag", "b_v")}
     bright = columns["v_mag"] <= magnitude_limit
@@ -226,9 +226,13 @@ def star_sky(
         If the height or the width of the stars is out of range.
     """
     if height < _SMALLEST_HEIGHT:
-        raise BlackHoleError(f"A sky {height} texels high is too small; give at least {_SMALLEST_HEIGHT}.")
+        raise BlackHoleError(
+            f"A sky {height} texels high is too small; give at least {_SMALLEST_HEIGHT}.", code="settings.range"
+        )
     if not 0.3 <= star_width <= 20.0:
-        raise BlackHoleError(f"A star width of {star_width} texels is not drawable; give one from 0.3 to 20.")
+        raise BlackHoleError(
+            f"A star width of {star_width} texels is not drawable; give one from 0.3 to 20.", code="settings.range"
+        )
     stars = load_stars(magnitude_limit)
     picture = draw_stars(stars, height, star_width)
     if galactic_glow:

@@ -50,7 +50,7 @@ class LensNumbers:
             For a negative spin, which the shader does not know, or when the motion is impossible.
         """
         if parameters.spin < 0.0:
-            raise BlackHoleError("The lens camera takes spins from 0: turn the hole over instead.")
+            raise BlackHoleError("The lens camera takes spins from 0: turn the hole over instead.", code="hole.spin")
         observer = parameters.observer()
         axes = np.array(parameters.camera_to_hole)
         corner, size = _plane(parameters.camera)

@@ -28,11 +28,13 @@ def number(value: Any, what: str) -> float:
         If value is not one real number.
     """
     if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) != 0:
-        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.")
+        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.", code="settings.type")
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as one number.") from error
+        raise BlackHoleError(
+            f"{_begin(what)} is {shown(value)}; give it as one number.", code="settings.type"
+        ) from error
 
 
 def finite(value: Any, what: str) -> float:
@@ -56,7 +58,7 @@ def finite(value: Any, what: str) -> float:
     """
     result = number(value, what)
     if not math.isfinite(result):
-        raise BlackHoleError(f"{_begin(what)} is {result:g}; give it as a finite number.")
+        raise BlackHoleError(f"{_begin(what)} is {result:g}; give it as a finite number.", code="settings.range")
     return result
 
 
@@ -84,7 +86,7 @@ def three(value: Any, what: str) -> tuple[Any, Any, Any]:
     except TypeError:
         parts = []
     if len(parts) != 3:
-        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as three of a kind.")
+        raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as three of a kind.", code="settings.type")
     return parts[0], parts[1], parts[2]
 
 
@@ -132,7 +134,7 @@ def switch(value: Any, what: str) -> bool:
     """
     if type(value).__name__ in ("bool", "bool_"):
         return bool(value)
-    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as True or False.")
+    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as True or False.", code="settings.type")
 
 
 def whole(value: Any, what: str) -> int:
@@ -159,7 +161,7 @@ def whole(value: Any, what: str) -> int:
             return operator.index(value)
     except TypeError:
         pass
-    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as a whole number.")
+    raise BlackHoleError(f"{_begin(what)} is {shown(value)}; give it as a whole number.", code="settings.type")
 
 
 def shown(value: Any) -> str:

@@ -51,10 +51,14 @@ def disk_layers(
     """
     look.validate()
     if not passes or len({one.metadata["hash"] for one in passes}) != 1:
-        raise BlackHoleError("The disk's passes are not of one map; give all crossings of one bake.")
+        raise BlackHoleError(
+            "The disk's passes are not of one map; give all crossings of one bake.", code="map.passes-mixed"
+        )
     crossings = [one.metadata["crossing"] for one in passes]
     if crossings != list(range(1, len(passes) + 1)):
-        raise BlackHoleError(f"The disk's passes are crossings {crossings}; give them from 1 on, none left out.")
+        raise BlackHoleError(
+            f"The disk's passes are crossings {crossings}; give them from 1 on, none left out.", code="map.passes-mixed"
+        )
     parameters = passes[0].metadata["parameters"]
     disk, spin = Disk(**parameters["disk"]), float(parameters["spin"])
     shape = passes[0].coverage.shape

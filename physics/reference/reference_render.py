@@ -238,17 +238,23 @@ def render(
     theta, phi, one_plus_z, visibility = _channels(warp_map)
     sky_picture: FloatArray = np.asarray(environment, dtype=np.float64)
     if sky_picture.ndim != 3 or sky_picture.shape[2] not in (3, 4):
-        raise BlackHoleError(f"The environment has shape {sky_picture.shape}, expected (rows, columns, 3 or 4).")
+        raise BlackHoleError(
+            f"The environment has shape {sky_picture.shape}, expected (rows, columns, 3 or 4).",
+            code="settings.array",
+        )
     front = None if foreground is None else np.asarray(foreground, dtype=np.float64)
     if front is not None and (front.ndim != 3 or front.shape[2] != 4):
-        raise BlackHoleError(f"The foreground has shape {front.shape}, expected (height, width, 4).")
+        raise BlackHoleError(
+            f"The foreground has shape {front.shape}, expected (height, width, 4).", code="settings.array"
+        )
     if output_size is None:
         rows, columns = theta.shape if front is None else front.shape[:2]
         output_size = (columns, rows)
     if front is not None and front.shape[:2] != output_size[::-1]:
         rows, columns = front.shape[:2]
         raise BlackHoleError(
-            f"The foreground is {columns}x{rows} pixels, the picture {output_size[0]}x{output_size[1]}."
+            f"The foreground is {columns}x{rows} pixels, the picture {output_size[0]}x{output_size[1]}.",
+            code="settings.array",
         )
 
     invalid = invalid_pixels(warp_map)
@@ -276,7 +282,9 @@ def _channels(warp_map: WarpMapLike) -> tuple[FloatArray, FloatArray, FloatArray
     visibility: FloatArray = np.asarray(warp_map.visibility, dtype=np.float64)
     shapes = {theta.shape, phi.shape, one_plus_z.shape, visibility.shape}
     if len(shapes) != 1 or theta.ndim != 2:
-        raise BlackHoleError("The warp map's four channels must share one shape (height, width).")
+        raise BlackHoleError(
+            "The warp map's four channels must share one shape (height, width).", code="settings.array"
+        )
     return theta, phi, one_plus_z, visibility
 
 

@@ -31,7 +31,8 @@ def _check_size(width: int, height: int) -> None:
     width, height = whole(width, "the picture's width"), whole(height, "the picture's height")
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         raise BlackHoleError(
-            f"The picture's size is {width} x {height}; each side must be between 1 and {LARGEST_SIDE} pixels."
+            f"The picture's size is {width} x {height}; each side must be between 1 and {LARGEST_SIDE} pixels.",
+            code="camera.size",
         )
 
 
@@ -78,16 +79,22 @@ class PerspectiveCamera:
             if not SHORTEST <= length <= LONGEST:
                 raise BlackHoleError(
                     "The camera's focal length, sensor and pixel aspect must be positive numbers, from "
-                    f"{SHORTEST:g} to {LONGEST:g}."
+                    f"{SHORTEST:g} to {LONGEST:g}.",
+                    code="camera.lens",
                 )
             object.__setattr__(self, name, length)
         for name in ("shift_x", "shift_y"):
             shift = number(getattr(self, name), "the camera's lens shift")
             if not abs(shift) <= LONGEST:
-                raise BlackHoleError(f"The camera's lens shift must be a finite number, up to {LONGEST:g}.")
+                raise BlackHoleError(
+                    f"The camera's lens shift must be a finite number, up to {LONGEST:g}.", code="camera.lens"
+                )
             object.__setattr__(self, name, shift)
         if self.sensor_fit not in SENSOR_FITS:
-            raise BlackHoleError(f"The sensor fit is {shown(self.sensor_fit)}; choose one of {', '.join(SENSOR_FITS)}.")
+            raise BlackHoleError(
+                f"The sensor fit is {shown(self.sensor_fit)}; choose one of {', '.join(SENSOR_FITS)}.",
+                code="settings.choice",
+            )
 
     @classmethod
     def from_field_of_view(cls, width: int, height: int, vertical: float) -> PerspectiveCamera:
@@ -101,7 +108,8 @@ class PerspectiveCamera:
         vertical = number(vertical, "the field of view")
         if not 0.0 < vertical < math.pi:
             raise BlackHoleError(
-                f"The field of view is {math.degrees(vertical):g} degrees; it must be between 0 and 180 degrees."
+                f"The field of view is {math.degrees(vertical):g} degrees; it must be between 0 and 180 degrees.",
+                code="camera.lens",
             )
         sensor = 24.0
         return cls(
@@ -213,7 +221,8 @@ class PanoramaCamera:
             if not -limit * (1 + 1e-6) <= low < high <= limit * (1 + 1e-6):
                 raise BlackHoleError(
                     f"The panorama's {name} runs from {math.degrees(low):g} to {math.degrees(high):g} degrees; "
-                    f"it must rise within -{math.degrees(limit):g} and {math.degrees(limit):g} degrees."
+                    f"it must rise within -{math.degrees(limit):g} and {math.degrees(limit):g} degrees.",
+                    code="camera.lens",
                 )
 
     def cropped(self, column: int, row: int, width: int, height: int) -> PanoramaCamera:

@@ -60,10 +60,12 @@ class Disk:
         if not (math.isfinite(inner) and inner >= closest):
             raise BlackHoleError(
                 f"The disk's inner radius is {inner:.4g} M; the horizon of this hole allows {closest:.4g} M at the "
-                f"least."
+                f"least.",
+                code="disk.radius",
             )
         if not inner < outer <= LARGEST_OUTER_RADIUS:
             raise BlackHoleError(
                 f"The disk's outer radius is {outer:.4g} M; it must be larger than the inner one, {inner:.4g} M, and "
-                f"at most {LARGEST_OUTER_RADIUS:g} M."
+                f"at most {LARGEST_OUTER_RADIUS:g} M.",
+                code="disk.radius",
             )

@@ -92,9 +92,14 @@ class WarpMapParameters:
             object.__setattr__(self, name, rows)
         object.__setattr__(self, "supersampling", whole(self.supersampling, "the supersampling"))
         if not isinstance(self.camera, PerspectiveCamera | PanoramaCamera):
-            raise BlackHoleError(f"The camera is {shown(self.camera)}; give a PerspectiveCamera or a PanoramaCamera.")
+            raise BlackHoleError(
+                f"The camera is {shown(self.camera)}; give a PerspectiveCamera or a PanoramaCamera.",
+                code="settings.type",
+            )
         if not (self.disk is None or isinstance(self.disk, Disk)):
-            raise BlackHoleError(f"The disk is {shown(self.disk)}; give a Disk, or None for none.")
+            raise BlackHoleError(
+                f"The disk is {shown(self.disk)}; give a Disk, or None for none.", code="settings.type"
+            )
 
     def validate(self) -> None:
         """Raise BlackHoleError, with a sentence for the user, when no map can be made from these parameters."""
@@ -103,17 +108,18 @@ class WarpMapParameters:
         if not 0.0 <= self.interpolation <= LARGEST_INTERPOLATION:
             raise BlackHoleError(
                 f"The interpolation error is {self.interpolation:g}; give it a value between 0 (every pixel is traced) "
-                f"and {LARGEST_INTERPOLATION:g} radians."
+                f"and {LARGEST_INTERPOLATION:g} radians.",
+                code="settings.range",
             )
         if self.supersampling not in SUPERSAMPLING:
-            raise BlackHoleError(f"The supersampling is {self.supersampling}; choose 1, 2 or 4.")
+            raise BlackHoleError(f"The supersampling is {self.supersampling}; choose 1, 2 or 4.", code="settings.range")
         if not all(math.isfinite(value) for value in (*self.camera_position, *self.velocity)):
-            raise BlackHoleError("The camera's place and velocity must be finite numbers.")
+            raise BlackHoleError("The camera's place and velocity must be finite numbers.", code="camera.position")
         for name in ("camera_to_hole", "hole_to_world"):
             matrix = np.array(getattr(self, name))
             proper = bool((np.abs(matrix) < 2.0).all()) and np.linalg.det(matrix) > 0.0
             if not proper or np.abs(matrix @ matrix.T - np.eye(3)).max() > ROTATION_TOLERANCE:
-                raise BlackHoleError(f"The matrix {name} is not a rotation.")
+                raise BlackHoleError(f"The matrix {name} is not a rotation.", code="settings.array")
         metric_functions(self.spin, self.radius, 0.5)  # inside the horizon is the first thing to say
         self.observer()
         if self.disk is not None:
@@ -145,7 +151,9 @@ class WarpMapParameters:
             Where this motion is impossible: static inside the ergosphere, faster than light, inside the horizon.
         """
         if not isinstance(self.motion, str):
-            raise BlackHoleError(f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.")
+            raise BlackHoleError(
+                f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.", code="settings.choice"
+            )
         x, y, z = self.camera_position
         r, theta, phi = self.radius, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
         match self.motion:
@@ -159,14 +167,17 @@ class WarpMapParameters:
                 return Observer.free_fall(self.spin, r, theta, phi)
             case "velocity":
                 return self._moving_observer(r, theta, phi)
-        raise BlackHoleError(f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.")
+        raise BlackHoleError(
+            f"There is no motion {shown(self.motion)}; choose one of {', '.join(MOTIONS)}.", code="settings.choice"
+        )
 
     def _moving_observer(self, r: float, theta: float, phi: float) -> Observer:
         local = spherical_triad(theta, phi) @ np.array(self.velocity)
         speed = float(np.linalg.norm(local))
         if not speed < 1.0:
             raise BlackHoleError(
-                f"The camera moves at {speed:.3g} times the speed of light; slow it down or raise the speed of light."
+                f"The camera moves at {speed:.3g} times the speed of light; slow it down or raise the speed of light.",
+                code="camera.too-fast",
             )
         if speed == 0.0:
             return Observer.fido(r, theta, phi)

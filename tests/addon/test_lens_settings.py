@@ -150,7 +150,7 @@ def test_a_gpu_without_shaders_is_named_and_the_cpu_renders_if_it_may(scene, tmp
     before = preferences.compute_device_type
     try:
         preferences.compute_device_type, scene.cycles.device = others[0], "GPU"
-        assert "cannot run camera shaders: only OptiX can" in shader.device_problem(scene)
+        assert "cannot run camera shaders: only OptiX can" in str(shader.device_problem(scene))
         scene.umbra.cpu_fallback = True
         assert render(scene, tmp_path / "cpu.exr", exr)[..., 0].max() > 0.5
         assert scene.cycles.device == "GPU"

@@ -176,7 +176,10 @@ def remove(scene: bpy.types.Scene) -> None:
     tree = find_tree(scene)
     ours = [node for node in tree.nodes if node.get(ROLE)] if tree is not None else []
     if not ours and BEFORE not in scene:
-        raise SceneError(f'The compositor of scene "{scene.name}" contains no black hole: there is nothing to remove.')
+        raise SceneError(
+            f'The compositor of scene "{scene.name}" contains no black hole: there is nothing to remove.',
+            code="compositor.no-hole",
+        )
     kept = scene.get(BEFORE)
     before = kept.to_dict() if hasattr(kept, "to_dict") else {}
     if tree is not None:

@@ -48,12 +48,12 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
         point_at_maps(scene)
     except SceneError as error:
         if notes is not None:
-            notes.append(str(error))
+            notes.append(error.for_user())
     try:
         sync_sky(scene)
     except SceneError as error:
         if notes is not None:
-            notes.append(str(error))
+            notes.append(error.for_user())
 
 
 def point_at_maps(scene: bpy.types.Scene) -> None:

@@ -78,7 +78,9 @@ class CompositorOutput(Output):
             If the scene has another output, or its compositor cannot be changed.
         """
         if scene.umbra.output != self.identifier:
-            raise SceneError("This scene's output is another one: choose Output: Compositor first.")
+            raise SceneError(
+                "This scene's output is another one: choose Output: Compositor first.", code="compositor.other-output"
+            )
         return compositing.set_up(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
@@ -205,7 +207,7 @@ class CompositorOutput(Output):
         try:
             environment.check_image(environment.read(scene).image)
         except physics.BlackHoleError as error:
-            return str(error)
+            return error.for_user()
         return None
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -224,5 +226,5 @@ def _unresolved(wanted: MapRequest, frame: FrameSetup) -> list[str]:
         "Umbra panel, which resolves them."
     )
     if messages.without_window():
-        raise SceneError(text)
+        raise SceneError(text, code="map.unresolved")
     return [text]

@@ -48,7 +48,9 @@ def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
     settings = scene.umbra
     if settings.foreground is None and not nearer:
         raise SceneError(
-            "No object reaches nearer to the camera than the hole, outside of the lens sphere: nothing to put in front."
+            "No object reaches nearer to the camera than the hole, outside of the lens sphere: nothing to put in "
+            "front.",
+            code="lens.no-foreground",
         )
     if settings.foreground is None:
         settings.foreground = bpy.data.collections.new(COLLECTION_NAME)
@@ -127,7 +129,10 @@ def _make_plain(second: bpy.types.Scene) -> None:
 def _follow_camera(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     """Give the second scene a camera that goes where the first one goes and sees what that saw before the lens."""
     if scene.camera is None:
-        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
+            code="camera.none",
+        )
     if second.camera is None:
         data = scene.camera.data.copy()
         lens_camera.restore(data)
@@ -189,7 +194,9 @@ def _compose(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     tree = lens_tree.claim(scene)
     output = tree_editing.output_node(tree)
     if output is None:
-        raise SceneError(f'The compositor of scene "{scene.name}" has no output node: add one.')
+        raise SceneError(
+            f'The compositor of scene "{scene.name}" has no output node: add one.', code="compositor.no-output"
+        )
     layer, over = find_node(tree, LAYER), find_node(tree, OVER)
     if layer is None:
         layer = tree.nodes.new("CompositorNodeRLayers")

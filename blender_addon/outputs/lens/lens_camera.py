@@ -30,7 +30,9 @@ def check(camera: bpy.types.Camera) -> None:
         If the camera is linked from another file.
     """
     if not is_converted(camera) and camera.library is not None:
-        raise SceneError(f'Camera "{camera.name}" is linked from another file: make it local first.')
+        raise SceneError(
+            f'Camera "{camera.name}" is linked from another file: make it local first.', code="settings.linked"
+        )
 
 
 def convert(camera: bpy.types.Camera) -> None:

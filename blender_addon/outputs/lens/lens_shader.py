@@ -36,18 +36,23 @@ def bytecode(*, uses_map: bool) -> tuple[str, str]:
     try:
         import _cycles
     except ImportError:
-        raise SceneError("Cycles is not available: enable it in Preferences > Add-ons.") from None
+        raise SceneError(
+            "Cycles is not available: enable it in Preferences > Add-ons.", code="lens.no-cycles"
+        ) from None
     if not _cycles.with_osl:
         raise SceneError(
             "This Blender was built without Open Shading Language, which the Cycles Lens needs: use an official build, "
-            "or choose Output: Compositor."
+            "or choose Output: Compositor.",
+            code="lens.no-osl",
         )
     text = SOURCE.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         source, compiled = Path(folder, "umbra_lens.osl"), Path(folder, "umbra_lens.oso")
         source.write_text(f"#define {MAP_DEFINE}\n{text}" if uses_map else text, encoding="utf-8")
         if not _cycles.osl_compile(str(source), str(compiled)) or not compiled.is_file():
-            raise SceneError("Cycles could not compile the lens camera's shader; please report it.")
+            raise SceneError(
+                "Cycles could not compile the lens camera's shader; please report it.", code="lens.not-compiled"
+            )
         code = without_origin(compiled.read_text(encoding="utf-8"))
     return code, hashlib.md5(code.encode(), usedforsecurity=False).hexdigest()
 
@@ -89,15 +94,16 @@ def _same(present: object, value: object) -> bool:
     return tuple(present) == value if isinstance(value, tuple) else present == value
 
 
-def device_problem(scene: bpy.types.Scene) -> str | None:
-    """Why the device that the scene renders on cannot run a camera's shader, if so."""
+def device_problem(scene: bpy.types.Scene) -> SceneError | None:
+    """Return the error for a device that cannot run a camera's shader; None if the scene's device can."""
     if scene.cycles.device != "GPU":
         return None
     addon = bpy.context.preferences.addons.get("cycles")
     kind = addon.preferences.compute_device_type if addon is not None else "NONE"
     if kind in DEVICES_WITH_SHADERS:
         return None
-    return (
+    return SceneError(
         f"The GPU is used through {kind}, which cannot run camera shaders: only OptiX can. Choose CPU as Device in "
-        "Render Properties, or OptiX in Preferences > System."
+        "Render Properties, or OptiX in Preferences > System.",
+        code="lens.device",
     )

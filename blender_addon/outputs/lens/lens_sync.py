@@ -66,7 +66,8 @@ def check(scene: bpy.types.Scene) -> None:
     """
     if scene.render.engine != "CYCLES":
         raise SceneError(
-            "The Cycles Lens needs the render engine Cycles: choose it in Render Properties, or Output: Compositor."
+            "The Cycles Lens needs the render engine Cycles: choose it in Render Properties, or Output: Compositor.",
+            code="lens.engine",
         )
 
 
@@ -79,7 +80,10 @@ def check_camera(scene: bpy.types.Scene) -> None:
         If there is none.
     """
     if scene.camera is None or scene.camera.type != "CAMERA":
-        raise SceneError(f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
+            code="camera.none",
+        )
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:

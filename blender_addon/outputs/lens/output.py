@@ -105,7 +105,7 @@ class LensOutput(Output):
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Return the frame's exit map."""
         if not lens_sync.uses_maps(scene):
-            raise SceneError(NO_MAPS)
+            raise SceneError(NO_MAPS, code="lens.no-maps")
         return _exit_map(scene, frame)
 
     def begin_render(self, scene: bpy.types.Scene) -> None:
@@ -114,7 +114,7 @@ class LensOutput(Output):
         problem = lens_shader.device_problem(scene)
         if problem is not None:
             if not scene.umbra.cpu_fallback:
-                raise SceneError(problem)
+                raise problem
             messages.warn(f"{problem} This render is made on the CPU.")
             _devices.put(scene, scene.cycles.device)
             scene.cycles.device = "CPU"
@@ -176,7 +176,7 @@ class LensOutput(Output):
         found = []
         problem = lens_shader.device_problem(scene)
         if problem is not None:
-            found.append(Notice(problem, "INFO" if scene.umbra.cpu_fallback else "ERROR"))
+            found.append(Notice(problem.for_user(), "INFO" if scene.umbra.cpu_fallback else "ERROR"))
         found += [Notice(each) for each in lens_objects.warnings(scene, depsgraph, frame)]
         if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
             found.append(Notice("The viewport shows the lens without the camera's speed; a render has it."))

@@ -79,11 +79,13 @@ def check_rendered(scene: bpy.types.Scene) -> None:
     if not layers:
         raise SceneError(
             f'The compositor of scene "{scene.name}" has no Render Layers node, so nothing is rendered: add one, or '
-            "run Set Up Compositor."
+            "run Set Up Compositor.",
+            code="compositor.no-render-layers",
         )
     if not any(scene.view_layers[name].use for name in layers if name in scene.view_layers):
         raise SceneError(
-            f'View layer "{layers[0]}" is not rendered: switch on Use for Rendering in its View Layer Properties.'
+            f'View layer "{layers[0]}" is not rendered: switch on Use for Rendering in its View Layer Properties.',
+            code="compositor.layer-off",
         )
 
 
@@ -103,7 +105,8 @@ def check_linked(scene: bpy.types.Scene) -> None:
     if setup.map is None or setup.map not in origins:
         raise SceneError(
             f'The compositor of scene "{scene.name}" does not give the warp maps to the node "{setup.group.name}": run '
-            "Set Up Compositor."
+            "Set Up Compositor.",
+            code="compositor.not-linked",
         )
 
 

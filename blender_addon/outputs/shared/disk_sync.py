@@ -70,18 +70,21 @@ def check_shot(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") 
         if path is None and not _is_close(socket.default_value, value):
             raise SceneError(
                 f'The spin or the edges of "{hole.name}" are animated in a way that its disk cannot follow: give them '
-                "keyframes of their own in place of strips of the Nonlinear Animation."
+                "keyframes of their own in place of strips of the Nonlinear Animation.",
+                code="disk.strips",
             )
     if disk_animation.in_strips(hole) & {f"umbra.disk.{field}" for field in disk_group.LOOK_SOCKETS}:
         raise SceneError(
             f'Settings of the disk of "{hole.name}" are moved by strips of the Nonlinear Animation, which its picture '
-            "cannot follow: give them keyframes of their own (Object > Animation > Bake Action)."
+            "cannot follow: give them keyframes of their own (Object > Animation > Bake Action).",
+            code="disk.strips",
         )
     driven = sorted(disk_animation.driven(hole) & {disk_animation.SPIN, disk_animation.INNER, disk_animation.OUTER})
     if driven:
         raise SceneError(
             f'{driven[0].rpartition(".")[2].replace("_", " ").capitalize()} of "{hole.name}" has a driver, of which '
-            "the disk's streaks cannot know other frames: give it keyframes (Object > Animation > Bake Action)."
+            "the disk's streaks cannot know other frames: give it keyframes (Object > Animation > Bake Action).",
+            code="disk.driver",
         )
 
 

@@ -82,12 +82,16 @@ def check_shared(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> None:
     if has_scene_tree():
         return
     if tree.library is not None:
-        raise SceneError(f'The compositor tree "{tree.name}" is linked from another file: make it local first.')
+        raise SceneError(
+            f'The compositor tree "{tree.name}" is linked from another file: make it local first.',
+            code="settings.linked",
+        )
     others = [each.name for each in bpy.data.scenes if each != scene and each.compositing_node_group == tree]
     if others:
         raise SceneError(
             f'The compositor tree "{tree.name}" also belongs to scene "{others[0]}", which has no part in '
-            "this black hole: make it single-user in the Compositor first."
+            "this black hole: make it single-user in the Compositor first.",
+            code="compositor.shared",
         )
 
 

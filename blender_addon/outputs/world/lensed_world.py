@@ -62,10 +62,12 @@ def check(scene: bpy.types.Scene) -> None:
         return
     world = scene.world
     if world is None:
-        raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
+        )
     uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
     if uses_nodes and not any(node.type == "BACKGROUND" for node in world.node_tree.nodes):
-        raise SceneError(_NO_BACKGROUND.format(world.name))
+        raise SceneError(_NO_BACKGROUND.format(world.name), code="sky.no-background")
 
 
 def install(scene: bpy.types.Scene) -> bpy.types.Node:
@@ -157,7 +159,9 @@ def _delete(world: bpy.types.World) -> None:
 def _copy_of_world(scene: bpy.types.Scene) -> bpy.types.World:
     world = scene.world
     if world is None:
-        raise SceneError(f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.')
+        raise SceneError(
+            f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
+        )
     made = world.copy()
     made.name = f"{world.name} (lensed)"
     if NODES_ARE_OPTIONAL and not made.use_nodes:
@@ -195,7 +199,7 @@ def _insert(world: bpy.types.World) -> bpy.types.Node:
     tree = world.node_tree
     backgrounds = [node for node in tree.nodes if node.type == "BACKGROUND"]
     if not backgrounds:
-        raise SceneError(_NO_BACKGROUND.format(world.name.removesuffix(" (lensed)")))
+        raise SceneError(_NO_BACKGROUND.format(world.name.removesuffix(" (lensed)")), code="sky.no-background")
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = world_group.new_group()
     node.name = node.label = world_group.GROUP_NAME

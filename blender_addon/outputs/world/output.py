@@ -76,7 +76,7 @@ class WorldOutput(Output):
 
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Refuse: world maps have no pixels of a picture."""
-        raise SceneError(NOT_CHECKED)
+        raise SceneError(NOT_CHECKED, code="map.not-checkable")
 
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the World read no map, and refuse one that is not the lensed one any more."""
@@ -118,7 +118,7 @@ class WorldOutput(Output):
         try:
             check_world(scene)
         except SceneError as error:
-            found.append(Notice(str(error), "ERROR"))
+            found.append(Notice(error.for_user(), "ERROR"))
         return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -135,12 +135,13 @@ def check_world(scene: bpy.types.Scene) -> None:
         If another World was chosen, or a view layer has one of its own.
     """
     if lensed_world.lensed_world(scene) is None:
-        raise SceneError(ANOTHER_WORLD.format(scene.name))
+        raise SceneError(ANOTHER_WORLD.format(scene.name), code="sky.world-changed")
     for layer in scene.view_layers:
         if layer.use and getattr(layer, "world_override", None) is not None:
             raise SceneError(
                 f'View layer "{layer.name}" has a World Override, which hides the lensed World: clear it in View Layer '
-                "Properties, or choose another output."
+                "Properties, or choose another output.",
+                code="sky.world-override",
             )
 
 
@@ -150,7 +151,8 @@ def _check_resolved(wanted: MapRequest, frame: FrameSetup) -> None:
         label = physics.METHODS[frame.parameters.method].label
         raise SceneError(
             f"Frame {frame.frame}: {unresolved} rays of the world map could not be resolved by the method "
-            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.'
+            f'"{label}"; choose the method "Fast" in the Umbra panel, which resolves them.',
+            code="map.unresolved",
         )
 
 

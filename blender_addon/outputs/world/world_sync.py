@@ -30,7 +30,7 @@ def refresh(scene: bpy.types.Scene) -> None:
             lensed_world.remove(scene)
             write_to_group(lensed_world.install(scene), values)
         except SceneError as error:
-            messages.warn(str(error))
+            messages.warn(error.for_user())
             scene.world = before
             return
     if not shows_live(scene):
