@@ -5,10 +5,12 @@
 
 class Object:
     umbra: typing.Any
+    original: Object
     data: typing.Any  # its class depends on the object's type
 
 class Scene:
     umbra: typing.Any
+    original: Scene
     node_tree: NodeTree  # Blender 4.5; 5.0 has compositing_node_group
     use_nodes: bool
     cycles: typing.Any  # Cycles adds it
@@ -78,18 +80,10 @@ class Panel:
 class Menu:
     layout: UILayout
     def draw(self, context: Context) -> None: ...
-    @classmethod
-    def append(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
-    @classmethod
-    def remove(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
 
 class Header:
     layout: UILayout
     def draw(self, context: Context) -> None: ...
-    @classmethod
-    def append(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
-    @classmethod
-    def remove(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
 
 class Operator:
     layout: UILayout
@@ -129,6 +123,9 @@ class ContextTempOverride:
 class Vector:
     def __iter__(self) -> collections.abc.Iterator[float]: ...
 
+class Color:
+    def __iter__(self) -> collections.abc.Iterator[float]: ...
+
 class Euler:
     def __iter__(self) -> collections.abc.Iterator[float]: ...
 
@@ -148,14 +145,29 @@ class RenderSettings:
 
 class Camera:
     cycles: typing.Any  # Cycles adds it
+    cycles_custom: typing.Any
     type: str
     dof: CameraDOFSettings
+
+class _GenericUI:
+    @classmethod
+    def append(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
+    @classmethod
+    def remove(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
 
 class UILayout:
     def label(self, *, text: str = "", icon: str = "NONE") -> None: ...
 
 class NodeTreeInterface:
-    def new_socket(self, name: str, *, description: str = "", in_out: str = "INPUT", socket_type: str = "DEFAULT", parent: NodeTreeInterfacePanel | None = None) -> NodeTreeInterfaceSocket: ...
+    def new_socket(
+        self,
+        name: str,
+        *,
+        description: str = "",
+        in_out: str = "INPUT",
+        socket_type: str = "DEFAULT",
+        parent: NodeTreeInterfacePanel | None = None,
+    ) -> NodeTreeInterfaceSocket: ...
 
 # --- what all kinds have that the add-on meets: the kind is known by name or role, not by class ------
 
@@ -191,6 +203,18 @@ class ID:
 
 class ImagePreview:
     image_size: typing.Any  # a pair can be assigned
+
+class Property:
+    hard_min: float
+    hard_max: float
+
+class AddonPreferences:
+    compute_device_type: str  # of Cycles
+
+class WindowManager:
+    def invoke_confirm(
+        self, operator: Operator, event: Event, *, title: str = "", message: str = "", confirm_text: str = ""
+    ) -> set[str]: ...
 
 class Attribute:
     data: typing.Any

@@ -2,7 +2,7 @@
 """Plugin for mypy: amend the stubs for Blender where they are wrong, or stricter than Blender is.
 
 `blender_amendments.pyi` is read as a stub. The members of its classes replace those of the same name in the classes
-of `bpy.types` and `mathutils`; others are added. The properties that the add-on registers get their types here.
+of the stubs; others are added. The properties that the add-on registers get their types here.
 """
 
 import hashlib
@@ -29,7 +29,15 @@ from mypy.plugin import AttributeContext, ClassDefContext, Plugin, ReportConfigC
 from mypy.types import Instance, Type
 
 AMENDMENTS = Path(__file__).with_name("blender_amendments.pyi")
-MODULES = ("bpy.types", "mathutils")
+
+# Where the classes are that are not in `bpy.types`.
+ELSEWHERE = {
+    "Color": "mathutils",
+    "Euler": "mathutils",
+    "Matrix": "mathutils",
+    "Vector": "mathutils",
+    "_GenericUI": "_bpy_types",
+}
 
 # Properties that the add-on registers, and the classes that declare what is in them.
 DECLARATIONS = "blender_addon.settings.typed"
@@ -65,7 +73,7 @@ class BlenderPlugin(Plugin):
     def get_customize_class_mro_hook(self, fullname: str) -> Callable[[ClassDefContext], None] | None:
         """Amend a class before its body is analyzed."""
         module, _, name = fullname.rpartition(".")
-        return self._amend if module in MODULES and name in self._classes else None
+        return self._amend if name in self._classes and module == ELSEWHERE.get(name, "bpy.types") else None
 
     def _amend(self, context: ClassDefContext) -> None:
         if id(context.cls) in self._amended:  # a class is analyzed again until all names in it are known
