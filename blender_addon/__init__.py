@@ -2,6 +2,7 @@
 """Umbra Black Hole: a physically exact rotating black hole in a Blender scene."""
 
 import atexit
+import functools
 from collections.abc import Callable
 
 import bpy
@@ -62,7 +63,7 @@ def register() -> None:
     try:
         for each in _CLASSES:
             bpy.utils.register_class(each)
-            _undo.append(lambda each=each: bpy.utils.unregister_class(each))
+            _undo.append(functools.partial(bpy.utils.unregister_class, each))
         for module in _MODULES:
             module.register()
             _undo.append(module.unregister)

@@ -263,7 +263,7 @@ class _Work:
 
     def wait_for(self, frame: int) -> Generator[Progress, None, None]:
         """Let some time pass: only frames are left that other processes are baking."""
-        who = self._claims.holder(self._refused)
+        who = "another process" if self._refused is None else self._claims.holder(self._refused)
         for _ in range(round(POLL / WAIT)):
             time.sleep(WAIT)
             yield self._progress(frame, doing=f": waiting for {who}")

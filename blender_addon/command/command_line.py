@@ -52,6 +52,7 @@ def run(arguments: Sequence[str]) -> int:
         try:
             with stopping.stoppable() as out.stop:
                 scene = _scene_of(options)
+                status: int
                 status, summary = options.work(options, scene, _frames_of(options, scene), out)
         except KeyboardInterrupt:
             return out.fail(SceneError("Stopped; the maps that are finished stay.", code="command.stopped"))
@@ -172,7 +173,8 @@ def _drain(
             try:
                 progress = next(steps)
             except StopIteration as end:
-                return end.value
+                result: Result = end.value
+                return result
             if out.stop.asked:
                 raise KeyboardInterrupt
             tell(progress)

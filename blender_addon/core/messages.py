@@ -43,7 +43,7 @@ def _show_pending() -> None:
         return
     lines = [line for text in texts for line in textwrap.wrap(text, POPUP_WIDTH)]
 
-    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    def draw(menu: bpy.types.UIPopupMenu, _context: bpy.types.Context) -> None:
         for line in lines:
             menu.layout.label(text=line)
 

@@ -7,10 +7,20 @@ wheel, say) is seen as what it is.
 """
 
 import importlib.util
+from typing import TYPE_CHECKING
 
 PACKAGE = __package__.rpartition(".")[0]
 
-if importlib.util.find_spec(f"{PACKAGE}.physics") is not None:
+if TYPE_CHECKING or importlib.util.find_spec(f"{PACKAGE}.physics") is None:
+    import physics
+    from physics.accuracy_check import accuracy
+    from physics.files import disk_pass_file, exit_map_file, map_check, map_file, warp_map_file, world_map_file
+    from physics.images import exr
+    from physics.kerr import metric, orbiting_matter
+    from physics.light import color, disk_flux, disk_look, disk_texture, star_sky
+    from physics.maps import exit_map, lens, world_map
+    from physics.reference import disk_render, reference_render
+else:
     from .. import physics
     from ..physics.accuracy_check import accuracy
     from ..physics.files import disk_pass_file, exit_map_file, map_check, map_file, warp_map_file, world_map_file
@@ -19,15 +29,6 @@ if importlib.util.find_spec(f"{PACKAGE}.physics") is not None:
     from ..physics.light import color, disk_flux, disk_look, disk_texture, star_sky
     from ..physics.maps import exit_map, lens, world_map
     from ..physics.reference import disk_render, reference_render
-else:
-    import physics  # type: ignore[no-redef]
-    from physics.accuracy_check import accuracy  # type: ignore[no-redef]
-    from physics.files import disk_pass_file, exit_map_file, map_check, map_file, warp_map_file, world_map_file  # type: ignore[no-redef]
-    from physics.images import exr  # type: ignore[no-redef]
-    from physics.kerr import metric, orbiting_matter  # type: ignore[no-redef]
-    from physics.light import color, disk_flux, disk_look, disk_texture, star_sky  # type: ignore[no-redef]
-    from physics.maps import exit_map, lens, world_map  # type: ignore[no-redef]
-    from physics.reference import disk_render, reference_render  # type: ignore[no-redef]
 
 __all__ = [
     "PACKAGE",

@@ -7,7 +7,9 @@ An exception out of a signal could come at any moment, in the middle of starting
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any
 
 
 class Stop:
@@ -23,9 +25,9 @@ def stoppable() -> Iterator[Stop]:
     Only the main thread can listen; in any other, as renders in a window have, nothing is ever asked.
     """
     stop = Stop()
-    before: dict[int, object] = {}
+    before: dict[signal.Signals, signal.Handlers | Callable[[int, FrameType | None], Any] | int | None] = {}
 
-    def note(_signal: int, _frame: object) -> None:
+    def note(_signal: int, _frame: FrameType | None) -> None:
         stop.asked = True
         restore()
 

@@ -6,8 +6,8 @@ every datablock since the last time. So it holds a scene's number in the session
 """
 
 import functools
-from collections.abc import Generator, Iterable
-from typing import Any
+from collections.abc import Callable, Generator, Iterable
+from typing import Any, TypeVar
 
 import bpy
 
@@ -18,6 +18,11 @@ from ..core.session import scene_of
 from ..scene import frame_setup
 from ..scene.frame_setup import FrameSetup
 from . import registry
+
+Result = TypeVar("Result")
+
+# Work on the maps of some frames.
+_Work = Callable[[list[int], baking.RequestsAt, cache.FolderNames], Generator[baking.Progress, None, Result]]
 
 
 def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Any = None) -> FrameSetup:
@@ -106,6 +111,8 @@ def clean(
     return _with_names(scene, work, frames, view_layer_name)
 
 
-def _with_names(scene: bpy.types.Scene, work: Any, frames: Iterable[int], view_layer_name: str | None) -> Any:
+def _with_names(
+    scene: bpy.types.Scene, work: _Work[Result], frames: Iterable[int], view_layer_name: str | None
+) -> Generator[baking.Progress, None, Result]:
     names = cache.FolderNames(scene, frame_setup.active_hole(scene).name)
     return work(list(frames), _requests_later(scene, view_layer_name), names)

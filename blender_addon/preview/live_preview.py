@@ -9,6 +9,7 @@ during a long drag. Nothing here runs without a window or during a render.
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -27,6 +28,8 @@ from . import thumbnail
 BUDGET, PAUSE = 0.08, 0.001
 # Seconds after the last change until Cycles is made to look once more.
 SETTLE = 0.3
+
+Result = TypeVar("Result")
 
 
 @dataclass
@@ -214,7 +217,7 @@ def _camera_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup
 ) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
     """What the thumbnail is seen by; for a lens that only the World knows, all directions."""
-    data = scene.camera.evaluated_get(depsgraph).data
+    data = frame_setup.active_camera(scene).evaluated_get(depsgraph).data
     try:
         return frame_setup.camera_model(data, scene.render, scene.render.engine)
     except SceneError:
@@ -254,12 +257,13 @@ def _work(
     now.updates += 1
 
 
-def _paused(steps: Generator[float, None, object]) -> Generator[None, None, object]:
+def _paused(steps: Generator[float, None, Result]) -> Generator[None, None, Result]:
     while True:
         try:
             next(steps)
         except StopIteration as end:
-            return end.value
+            result: Result = end.value
+            return result
         yield
 
 

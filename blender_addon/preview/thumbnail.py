@@ -4,6 +4,7 @@
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 import bpy.utils.previews
@@ -34,7 +35,7 @@ _SOCKETS = {
 
 @dataclass(frozen=True)
 class _Sky:
-    key: tuple
+    key: tuple[object, ...]
     pixels: np.ndarray
 
 
@@ -83,7 +84,7 @@ def show(scene: bpy.types.Scene, picture: np.ndarray) -> None:
 def forget(scene: bpy.types.Scene) -> None:
     """Drop a scene's thumbnail."""
     _skies.drop(scene)
-    if _preview_of(scene) is not None:
+    if _collection.now is not None and _preview_of(scene) is not None:
         del _collection.now[str(scene.session_uid)]
 
 
@@ -121,13 +122,14 @@ def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float,
 def _encoded(values: np.ndarray) -> np.ndarray:
     """Linear light as a screen shows it (sRGB)."""
     held = np.clip(values, 0.0, 1.0)
-    return np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055)
+    encoded: np.ndarray = np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055)
+    return encoded
 
 
-def look(scene: bpy.types.Scene) -> dict[str, object]:
+def look(scene: bpy.types.Scene) -> dict[str, Any]:
     """How the sky is placed and shifted, as `reference_render.render` takes it; as it is where that cannot be read."""
     settings = scene.umbra
-    values: dict[str, object] = {
+    values: dict[str, Any] = {
         "color_amount": settings.redshift_color,
         "brightness_amount": settings.redshift_brightness,
         "temperature": settings.sky_temperature,
@@ -144,7 +146,7 @@ def look(scene: bpy.types.Scene) -> dict[str, object]:
     }
 
 
-def key(scene: bpy.types.Scene) -> tuple:
+def key(scene: bpy.types.Scene) -> tuple[object, ...]:
     """All that the thumbnail depends on besides the shot."""
     return (_image_key(_image_of(scene)), *look(scene).items())
 
@@ -166,7 +168,7 @@ def _image_of(scene: bpy.types.Scene) -> bpy.types.Image | None:
         return None
 
 
-def _image_key(image: bpy.types.Image | None) -> tuple:
+def _image_key(image: bpy.types.Image | None) -> tuple[object, ...]:
     return () if image is None else (image.name, image.filepath, tuple(image.size), image.is_dirty)
 
 

@@ -11,9 +11,9 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..bake import baking
 from ..bake import folder as map_folder
@@ -25,6 +25,9 @@ from ..outputs import frames, refreshing, registry
 from ..outputs.shared import disk_light
 from ..preview import live_preview
 from ..scene import frame_setup
+
+Handler = TypeVar("Handler", bound=Callable[..., None])
+persistent: Callable[[Handler], Handler] = bpy.app.handlers.persistent
 
 
 @dataclass

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A hole's settings at any frame, from their keyframes: known before Blender has evaluated the frame."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 
 from ..core.physics_api import disk_look, disk_texture, metric, physics
-from ..settings.disk_properties import BEAMINGS, LOOK_FIELDS, disk_of
+from ..settings.disk_properties import BEAMINGS, LOOK_FIELDS
 
 SPIN, INNER, OUTER = "umbra.spin", "umbra.disk.inner_radius", "umbra.disk.outer_radius"
 
@@ -26,7 +28,9 @@ def keyframes(hole: bpy.types.Object) -> dict[str, bpy.types.FCurve]:
 
 def in_strips(hole: bpy.types.Object) -> set[str]:
     """Data paths that strips of the Nonlinear Animation move."""
-    tracks = [] if hole.animation_data is None else hole.animation_data.nla_tracks
+    if hole.animation_data is None:
+        return set()
+    tracks = hole.animation_data.nla_tracks
     actions = [each.action for track in tracks if not track.mute for each in track.strips if not each.mute]
     return {
         curve.data_path
@@ -72,7 +76,7 @@ def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]
 def look_at(hole: bpy.types.Object, frame: float) -> "disk_look.DiskLook":
     """How the hole's disk looks at a frame."""
     settings = hole.umbra.disk
-    values = {
+    values: dict[str, Any] = {
         name: settings.profile if name == "profile" else value_at(hole, f"umbra.disk.{name}", frame)
         for name in LOOK_FIELDS
     }
@@ -85,11 +89,10 @@ def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
     Where spin or edges have keyframes it is the shortest of all frames, so that no frame shears a pattern further than
     it should be; with a time of its own for each frame, patterns would hurry or stand still as it changes.
     """
-    settings = hole.umbra.disk
     curves = keyframes(hole)
     if not curves.keys() & {SPIN, INNER, OUTER}:
-        disk = disk_of(settings)
-        return disk_texture.pattern_period(hole.umbra.spin, *disk.radii(hole.umbra.spin), disk.retrograde)
+        spin, disk = disk_at(hole, scene.frame_current)
+        return disk_texture.pattern_period(spin, *disk.radii(spin), disk.retrograde)
     periods = []
     done = set()
     for frame in range(scene.frame_start, scene.frame_end + 1):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sky around the hole: the World's, an image, or the built-in sky of real stars."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -52,6 +54,11 @@ def _input_path(node: bpy.types.Node, name: str) -> str:
     return f'node_tree.nodes["{bpy.utils.escape_identifier(node.name)}"].inputs[{index}].default_value'
 
 
+def _angles(rotation: Iterable[float]) -> tuple[float, float, float]:
+    x, y, z = rotation
+    return x, y, z
+
+
 def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str | None]:
     """Rotation of the sky before an Environment Texture, and the path to follow it by."""
     origin = _source(texture.inputs["Vector"])
@@ -84,8 +91,8 @@ def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str |
         )
     rotation = Euler(inputs["Rotation"].default_value, "XYZ")
     if mapping.vector_type == "TEXTURE":
-        return tuple(rotation.to_matrix().inverted().to_euler("XYZ")), None
-    return tuple(rotation), _input_path(mapping, "Rotation")
+        return _angles(rotation.to_matrix().inverted().to_euler("XYZ")), None
+    return _angles(rotation), _input_path(mapping, "Rotation")
 
 
 def read_world(scene: bpy.types.Scene) -> Sky:
@@ -151,14 +158,14 @@ def read_world(scene: bpy.types.Scene) -> Sky:
     return Sky(
         image=texture.image,
         texture=texture,
-        rotation=tuple(rotation),
+        rotation=_angles(rotation),
         strength=strength,
         rotation_path=rotation_path,
         strength_path=strength_path,
     )
 
 
-def _value_at(world: bpy.types.World, path: str | None, otherwise: object) -> object:
+def _value_at(world: bpy.types.World, path: str | None, otherwise: Any) -> Any:
     """What a copy of a World has at a path of the World."""
     try:
         return otherwise if path is None else world.path_resolve(path)

@@ -8,6 +8,7 @@ which step to other frames and back.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,7 +27,8 @@ MATRIX_TOLERANCE = 1e-4
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Rows = tuple[tuple[float, float, float], ...]
+Row = tuple[float, float, float]
+Rows = tuple[Row, Row, Row]
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,8 @@ def camera_velocity(
         scene.frame_set(whole, subframe=part)
         depsgraph = view_layer.depsgraph
         places = [np.array(each.evaluated_get(depsgraph).matrix_world.translation) for each in (camera, hole)]
-        return np.subtract(places[0], places[1], dtype=np.float64)
+        difference: Vector = np.subtract(places[0], places[1], dtype=np.float64)
+        return difference
 
     with _frame_kept(scene):
         before = separation(frame - 1, 0.5)
@@ -258,10 +261,27 @@ def check_render(render: bpy.types.RenderSettings, traits: Traits = PLAIN) -> No
         )
 
 
-def _panorama_setting(camera: bpy.types.Camera, name: str) -> object:
+def _panorama_setting(camera: bpy.types.Camera, name: str) -> Any:
     """A panorama setting, which Cycles kept for itself before Blender took it over."""
     owner = camera if hasattr(camera, name) else camera.cycles
     return getattr(owner, name)
+
+
+def active_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Return the scene's camera.
+
+    Raises
+    ------
+    SceneError
+        If there is none.
+    """
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA":
+        raise SceneError(
+            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
+            code="camera.none",
+        )
+    return camera
 
 
 def camera_model(
@@ -329,8 +349,14 @@ def _aperture(camera: bpy.types.Camera) -> float:
 # --- all together ---------------------------------------------------------------------------------
 
 
+def _row(vector: Vector) -> Row:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z
+
+
 def _rows(matrix: Matrix) -> Rows:
-    return tuple(tuple(float(value) for value in row) for row in matrix)
+    first, second, third = (_row(row) for row in matrix)
+    return first, second, third
 
 
 def read(
@@ -361,12 +387,7 @@ def read(
     check_render(scene.render, traits)
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
-    camera = scene.camera
-    if camera is None or camera.type != "CAMERA":
-        raise SceneError(
-            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
-            code="camera.none",
-        )
+    camera = active_camera(scene)
 
     evaluated_hole = hole.evaluated_get(depsgraph)
     evaluated_camera = camera.evaluated_get(depsgraph)
@@ -396,11 +417,11 @@ def read(
     parameters = physics.WarpMapParameters(
         spin=float(hole_settings.spin),
         camera=camera_model(evaluated_camera.data, scene.render, scene.render.engine, traits),
-        camera_position=tuple(float(value) for value in position),
+        camera_position=_row(position),
         camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
         hole_to_world=_rows(hole_pose.rotation),
         motion=MOTIONS[hole_settings.motion],
-        velocity=tuple(float(value) for value in speed),
+        velocity=_row(speed),
         supersampling=int(settings.supersampling),
         tolerance=tolerance,
         method=settings.method,

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the artist sets of a hole's accretion disk: `object.umbra.disk`."""
 
+from typing import Any
+
 import bpy
 
 from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import disk_flux, disk_look, metric, physics
+from .typed import DiskSettings
 
 # Blender saves an enum's number; identifiers are the physics' own names.
 PROFILES = (
@@ -53,7 +56,7 @@ def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
     changes.notify(Change.DISK, settings.id_data)
 
 
-def _amount(name: str, field: str, description: str) -> "bpy.types.FloatProperty":
+def _amount(name: str, field: str, description: str) -> Any:
     return bpy.props.FloatProperty(
         name=name,
         description=description,
@@ -251,12 +254,12 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     )
 
 
-def shows_picture(settings: UmbraDiskProperties) -> bool:
+def shows_picture(settings: DiskSettings) -> bool:
     """Whether the disk has the colors of the artist's picture."""
     return settings.texture is not None and settings.texture_use == COLOR
 
 
-def disk_of(settings: UmbraDiskProperties) -> "physics.Disk | None":
+def disk_of(settings: DiskSettings) -> "physics.Disk | None":
     """The disk whose passes are baked, or None."""
     if not settings.enabled:
         return None
@@ -268,13 +271,13 @@ def disk_of(settings: UmbraDiskProperties) -> "physics.Disk | None":
     )
 
 
-def look_of(settings: UmbraDiskProperties) -> "disk_look.DiskLook":
+def look_of(settings: DiskSettings) -> "disk_look.DiskLook":
     """How the disk looks."""
     values = {name: getattr(settings, name) for name in LOOK_FIELDS}
     return disk_look.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
 
 
-def use_look(settings: UmbraDiskProperties, look: "disk_look.DiskLook") -> None:
+def use_look(settings: DiskSettings, look: "disk_look.DiskLook") -> None:
     """Set all properties of the look."""
     for name in LOOK_FIELDS:
         if getattr(settings, name) != getattr(look, name):

@@ -7,6 +7,7 @@ from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import color, lens, physics
 from . import output_choice
+from .typed import SceneSettings
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
 ACCURACIES = {
@@ -222,7 +223,7 @@ def _preview_changed(settings: UmbraSceneProperties) -> None:
     changes.notify(Change.PREVIEW, settings.id_data)
 
 
-def tolerances_of(settings: UmbraSceneProperties) -> tuple[float, float]:
+def tolerances_of(settings: SceneSettings) -> tuple[float, float]:
     """The errors of direction allowed to tracing and to interpolation, radians, from the chosen accuracy."""
     return ACCURACIES.get(settings.quality, (settings.tolerance, settings.interpolation))
 

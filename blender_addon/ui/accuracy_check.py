@@ -12,11 +12,11 @@ from ..core.physics_api import accuracy, physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
 from ..scene import environment, frame_setup
-from .bake_operators import BakeOperator
+from .bake_operators import BakeOperator, Steps
 from .sidebar import HolePanel
 from .status import wrapped
 
-Report = tuple[int, "accuracy.AccuracyReport"]
+Report = tuple[int, "physics.AccuracyReport"]
 
 
 def _no_report() -> Report | None:
@@ -34,7 +34,7 @@ def report_of(scene: bpy.types.Scene) -> Report | None:
 
 def check_frame(
     scene: bpy.types.Scene, view_layer_name: str | None = None
-) -> "Generator[baking.Progress, None, accuracy.AccuracyReport]":
+) -> "Generator[baking.Progress, None, physics.AccuracyReport]":
     """Check the map of a scene's current frame.
 
     Raises
@@ -55,14 +55,14 @@ def check_frame(
 
 
 def _progress(
-    uid: int, frame: int, steps: "Generator[float, None, accuracy.AccuracyReport]"
-) -> "Generator[baking.Progress, None, accuracy.AccuracyReport]":
+    uid: int, frame: int, steps: "Generator[float, None, physics.AccuracyReport]"
+) -> "Generator[baking.Progress, None, physics.AccuracyReport]":
     """Tell of each step, and keep the report; the scene itself must not be kept while the work waits."""
     while True:
         try:
             fraction = next(steps)
         except StopIteration as end:
-            report: accuracy.AccuracyReport = end.value
+            report: physics.AccuracyReport = end.value
             scene = scene_of(uid)
             if scene is not None:
                 _reports.put(scene, (frame, report))
@@ -89,11 +89,11 @@ class UMBRA_OT_check_accuracy(BakeOperator, bpy.types.Operator):
     doing = "Checking accuracy"
     stopped = "The check was stopped."
 
-    def _start(self, context: bpy.types.Context) -> Generator:
+    def _start(self, context: bpy.types.Context) -> Steps:
         frame_setup.active_hole(context.scene)
         return check_frame(context.scene, context.view_layer.name)
 
-    def _report(self, report: "accuracy.AccuracyReport") -> None:
+    def _report(self, report: "physics.AccuracyReport") -> None:
         level = "WARNING" if report.differing or report.unresolved else "INFO"
         self.report({level}, report.text())
 

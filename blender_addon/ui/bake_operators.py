@@ -3,6 +3,7 @@
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
@@ -14,6 +15,14 @@ from ..outputs import frames as frame_maps
 from ..outputs import registry
 from ..scene import frame_setup
 from .reporting import TIMER_INTERVAL, only_one_is_rendered, reporting
+
+if TYPE_CHECKING:
+    from bpy.types import Operator as _Operator
+else:
+    _Operator = object  # Blender registers the operators themselves only
+
+# What an operator reports in the end is the result of its steps.
+Steps = Generator[baking.Progress, None, Any]
 
 
 @dataclass
@@ -32,12 +41,12 @@ def running() -> baking.Progress | None:
     return JOB.now.progress
 
 
-class BakeOperator:
+class BakeOperator(_Operator):
     """Run a bake, or other work on maps: at once in background and from scripts, in a window beside the interface."""
 
     doing = "Baking warp maps"
     stopped = "Baking was stopped; the maps that are finished stay."
-    _steps: Generator | None = None
+    _steps: Steps | None = None
     _timer: bpy.types.Timer | None = None
 
     def frames(self, scene: bpy.types.Scene) -> list[int]:
@@ -51,7 +60,7 @@ class BakeOperator:
             return False
         return True
 
-    def _start(self, context: bpy.types.Context) -> Generator:
+    def _start(self, context: bpy.types.Context) -> Steps:
         scene = context.scene
         frame_setup.active_hole(scene)
         if not registry.of(scene).needs_maps(scene):
@@ -62,7 +71,7 @@ class BakeOperator:
             self.report({"WARNING"}, only_one_is_rendered(scene))
         return self.work(context)
 
-    def work(self, context: bpy.types.Context) -> Generator:
+    def work(self, context: bpy.types.Context) -> Steps:
         """The steps of the work; what the generator returns is reported."""
         scene = context.scene
         return frame_maps.bake(scene, self.frames(scene), context.view_layer.name)
@@ -95,6 +104,8 @@ class BakeOperator:
             return self._end(context, {"CANCELLED"})
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
+        if self._steps is None:
+            return {"CANCELLED"}
         try:
             progress = next(self._steps)
         except StopIteration as end:
@@ -131,7 +142,8 @@ class BakeOperator:
         _redraw(context)
         return result
 
-    def _report(self, summary: baking.Summary) -> None:
+    def _report(self, summary: Any) -> None:
+        """Report the result of the steps."""
         self.report({"INFO"}, summary.sentence())
         if summary.unresolved:
             self.report(

@@ -2,17 +2,17 @@
 """Verify and clean the maps of a shot: two operators and their panel."""
 
 import time
-from collections.abc import Generator
 from dataclasses import dataclass
 
 import bpy
 
 from ..bake import cache
+from ..bake.check import State
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
 from ..scene import frame_setup
 from . import status
-from .bake_operators import BakeOperator
+from .bake_operators import BakeOperator, Steps
 from .sidebar import UmbraPanel
 
 
@@ -44,7 +44,7 @@ class UMBRA_OT_verify_maps(CacheOperator, bpy.types.Operator):
     doing = "Verifying maps"
     stopped = "Verifying was stopped."
 
-    def work(self, context: bpy.types.Context) -> Generator:
+    def work(self, context: bpy.types.Context) -> Steps:
         self._uid = context.scene.session_uid
         return frames.examine(context.scene, self.frames(context.scene), context.view_layer.name)
 
@@ -72,7 +72,7 @@ class UMBRA_OT_clean_maps(CacheOperator, bpy.types.Operator):
     )
     _beside_interface = False
 
-    def work(self, context: bpy.types.Context) -> Generator:
+    def work(self, context: bpy.types.Context) -> Steps:
         scene = context.scene
         _told.drop(scene)
         return frames.clean(scene, self.frames(scene), context.view_layer.name, everything=self.everything)
@@ -99,8 +99,8 @@ def lines(scene: bpy.types.Scene) -> list[status.Line]:
     if told is None or told.listing is None:
         return [status.Line("Not verified yet", "QUESTION")]
     found = [status.Line(f"{len(told.listing.frames)} frames, {told.listing.size / 1e6:.1f} MB at {told.when}", "FILE")]
-    icons = {cache.State.VALID: "CHECKMARK", cache.State.MISSING: "RADIOBUT_OFF", cache.State.STALE: "FILE_REFRESH"}
-    for state in cache.State:
+    icons = {State.VALID: "CHECKMARK", State.MISSING: "RADIOBUT_OFF", State.STALE: "FILE_REFRESH"}
+    for state in State:
         count = told.listing.counts[state]
         if count:
             found.append(status.Line(f"{count} {state}", icons.get(state, "ERROR")))

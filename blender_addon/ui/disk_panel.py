@@ -35,7 +35,7 @@ class UMBRA_OT_disk_preset(bpy.types.Operator):
         return frame_setup.find_active_hole(context.scene) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hole = frame_setup.find_active_hole(context.scene)
+        hole = frame_setup.active_hole(context.scene)
         disk_properties.use_look(hole.umbra.disk, disk_look.PRESETS[PRESET_NAMES[self.preset]])
         return {"FINISHED"}
 
@@ -45,12 +45,12 @@ class VIEW3D_PT_umbra_disk(HolePanel, bpy.types.Panel):
     bl_order = 1
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(frame_setup.find_active_hole(context.scene).umbra.disk, "enabled", text="")
+        self.layout.prop(frame_setup.active_hole(context.scene).umbra.disk, "enabled", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        hole = frame_setup.find_active_hole(context.scene)
+        hole = frame_setup.active_hole(context.scene)
         settings = hole.umbra.disk
         layout.active = settings.enabled
         layout.operator_menu_enum("umbra.disk_preset", "preset", icon="PRESET")
@@ -85,7 +85,7 @@ class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        settings = frame_setup.find_active_hole(context.scene).umbra.disk
+        settings = frame_setup.active_hole(context.scene).umbra.disk
         layout.active = settings.enabled
         layout.prop(settings, "profile")
         if settings.profile == "power_law":

@@ -71,7 +71,7 @@ class VIEW3D_PT_umbra_hole(UmbraPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
-        _draw_hole(self.layout, _hole(context))
+        _draw_hole(self.layout, frame_setup.active_hole(context.scene))
 
 
 class VIEW3D_PT_umbra_output(HolePanel, bpy.types.Panel):
@@ -115,14 +115,17 @@ class OBJECT_PT_umbra(bpy.types.Panel):
         return context.object is not None and (context.object.type == "EMPTY" or context.object.umbra.is_black_hole)
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(context.object.umbra, "is_black_hole", text="")
+        if context.object is not None:
+            self.layout.prop(context.object.umbra, "is_black_hole", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
+        layout, hole = self.layout, context.object
+        if hole is None:
+            return
         layout.use_property_split = True
-        layout.active = context.object.umbra.is_black_hole
-        _draw_hole(layout, context.object)
-        if context.object.umbra.is_black_hole and _hole(context) != context.object:
+        layout.active = hole.umbra.is_black_hole
+        _draw_hole(layout, hole)
+        if hole.umbra.is_black_hole and _hole(context) != hole:
             layout.operator("umbra.make_active")
 
 

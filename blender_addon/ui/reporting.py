@@ -3,20 +3,25 @@
 
 from collections.abc import Callable, Iterable
 from functools import wraps
+from typing import TypeVar
 
 import bpy
 
 from ..core.physics_api import physics
 from ..scene import frame_setup
 
+Operator = TypeVar("Operator", bound=bpy.types.Operator)
+
 TIMER_INTERVAL = 0.02  # seconds between steps of work that runs beside the interface
 
 
-def reporting(execute: Callable) -> Callable:
+def reporting(
+    execute: Callable[[Operator, bpy.types.Context], set[str]],
+) -> Callable[[Operator, bpy.types.Context], set[str]]:
     """Turn errors into the operator's report: the sentence and the code."""
 
     @wraps(execute)
-    def guarded(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+    def guarded(self: Operator, context: bpy.types.Context) -> set[str]:
         try:
             return execute(self, context)
         except physics.BlackHoleError as error:
@@ -34,7 +39,8 @@ def report_notes(operator: bpy.types.Operator, notes: Iterable[str]) -> None:
 
 def only_one_is_rendered(scene: bpy.types.Scene) -> str:
     """Return the warning about a scene with several holes."""
+    chosen = scene.umbra.active_hole
     return (
         f'The scene contains {len(frame_setup.holes(scene))} black holes, and one can be rendered: "'
-        f'{scene.umbra.active_hole.name}". Choose another one in the Umbra panel.'
+        f'{"" if chosen is None else chosen.name}". Choose another one in the Umbra panel.'
     )

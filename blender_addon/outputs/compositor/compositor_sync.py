@@ -28,9 +28,13 @@ def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
         return False
     tree = setup.group.node_tree
     inputs, outputs = setup.group.inputs, setup.group.outputs
-    whole = black_hole_group.is_group(tree) and all(spec.name in inputs for spec in black_hole_group.INPUTS)
+    whole = all(spec.name in inputs for spec in black_hole_group.INPUTS)
     whole = whole and all(spec.name in outputs for spec in black_hole_group.OUTPUTS)
-    if whole and not (thorough and not black_hole_group.is_current(tree)):
+    if tree is None or not black_hole_group.is_group(tree):
+        whole = False
+    elif whole and thorough:
+        whole = black_hole_group.is_current(tree)
+    if whole:
         return False
     setup.group.node_tree = black_hole_group.ensure_group()
     return True
@@ -105,8 +109,9 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
 def takes_sky_from_settings(setup: Setup) -> bool:
     """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
     socket = setup.group.inputs.get("Environment")
-    links = [] if socket is None else socket.links
-    return setup.sky is not None and any(link.from_node == setup.sky for link in links)
+    if socket is None or setup.sky is None:
+        return False
+    return any(link.from_node == setup.sky for link in socket.links)
 
 
 def sync_sky(scene: bpy.types.Scene) -> None:
@@ -121,7 +126,7 @@ def sync_sky(scene: bpy.types.Scene) -> None:
         There is no sky, or it cannot be read.
     """
     setup = find_setup(scene)
-    if setup is None or not takes_sky_from_settings(setup):
+    if setup is None or setup.sky is None or not takes_sky_from_settings(setup):
         return
     sky = environment.read(scene)
     if setup.sky.image != sky.image:
@@ -152,10 +157,10 @@ def _follow(
     is_vector = not isinstance(value, float)
     socket_path = socket.path_from_id("default_value")
     animation = setup.tree.animation_data
-    present = [each for each in animation.drivers if each.data_path == socket_path] if animation else []
+    drivers = animation.drivers if animation is not None else ()
+    present = [each for each in drivers if each.data_path == socket_path]
     if path is None:
-        for each in present:
-            animation.drivers.remove(each)
+        _remove(setup.tree, present)
         if fixed:
             socket.default_value = value
         elif present:  # the World's values are not those of a picture chosen by hand
@@ -164,8 +169,7 @@ def _follow(
     wanted = [f"{path}[{index}]" for index in range(3)] if is_vector else [path]
     if [_driven_by(each, scene.world) for each in sorted(present, key=lambda each: each.array_index)] == wanted:
         return
-    for each in present:
-        animation.drivers.remove(each)
+    _remove(setup.tree, present)
     for index, data_path in enumerate(wanted):
         driver = socket.driver_add("default_value", *([index] if is_vector else [])).driver
         driver.type = "SUM"
@@ -177,7 +181,13 @@ def _follow(
     socket.default_value = value
 
 
-def _driven_by(curve: bpy.types.FCurve, world: bpy.types.World) -> str | None:
+def _remove(tree: bpy.types.NodeTree, drivers: list[bpy.types.FCurve]) -> None:
+    for each in drivers:
+        if tree.animation_data is not None:
+            tree.animation_data.drivers.remove(each)
+
+
+def _driven_by(curve: bpy.types.FCurve, world: bpy.types.World | None) -> str | None:
     variables = curve.driver.variables
     if len(variables) != 1 or variables[0].targets[0].id != world or not curve.driver.is_valid:
         return None

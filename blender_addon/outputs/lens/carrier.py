@@ -34,7 +34,7 @@ class LensCarrier:
             for index, number in enumerate(value if isinstance(value, tuple) else (value,)):
                 tracks[camera, f'cycles_custom["{name}"]', index] = number
         second = self._scene.umbra.foreground_scene
-        if second is None:
+        if second is None or second.camera is None:
             return tracks
         for prefix, owner, names in (
             ("", camera, foreground.CAMERA_SETTINGS),

@@ -62,7 +62,9 @@ def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
         collection.objects.link(scene.objects[name])
     for layer in scene.view_layers:
         layer.layer_collection.children[collection.name].indirect_only = True
-    _compose(scene, refresh(scene))
+    second = refresh(scene)
+    if second is not None:
+        _compose(scene, second)
     return added
 
 
@@ -78,7 +80,7 @@ def refresh(scene: bpy.types.Scene) -> bpy.types.Scene | None:
         settings.foreground_scene = second
         _make_plain(second)
     _follow_camera(scene, second)
-    _share_objects(scene, second)
+    _share_objects(scene, second, settings.foreground)
     for name in ("frame_start", "frame_end", "frame_step"):
         setattr(second, name, getattr(scene, name))
     second.cycles.samples = scene.cycles.samples
@@ -128,25 +130,23 @@ def _make_plain(second: bpy.types.Scene) -> None:
 
 def _follow_camera(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     """Give the second scene a camera that goes where the first one goes and sees what that saw before the lens."""
-    if scene.camera is None:
-        raise SceneError(
-            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
-            code="camera.none",
-        )
+    camera = frame_setup.active_camera(scene)
     if second.camera is None:
-        data = scene.camera.data.copy()
+        data = camera.data.copy()
         lens_camera.restore(data)
         data.animation_data_clear()
-        data.name = f"{scene.camera.data.name} Foreground"
+        data.name = f"{camera.data.name} Foreground"
         second.camera = bpy.data.objects.new(data.name, data)
         second.collection.objects.link(second.camera)
-    if second.camera.parent != scene.camera:
-        second.camera.parent = scene.camera
-    copy_lens(second, scene.camera.data)
+    if second.camera.parent != camera:
+        second.camera.parent = camera
+    copy_lens(second, camera.data)
 
 
 def copy_lens(second: bpy.types.Scene, camera: bpy.types.Camera) -> None:
     """Carry what the (evaluated) camera of the lens says about its picture over to the plain one."""
+    if second.camera is None:
+        return
     plain = second.camera.data
     for owner, source, names in ((plain, camera, CAMERA_SETTINGS), (plain.dof, camera.dof, DEPTH_OF_FIELD)):
         for name in names:
@@ -167,9 +167,8 @@ def _remove_camera(second: bpy.types.Scene) -> None:
             bpy.data.cameras.remove(data)
 
 
-def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
+def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene, front: bpy.types.Collection) -> None:
     root = second.collection
-    front = scene.umbra.foreground
     if front.name not in root.children:
         root.children.link(front)
     back = next((child for child in root.children if child != front), None)
@@ -177,7 +176,7 @@ def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
         back = bpy.data.collections.new(BACKGROUND_NAME)
         root.children.link(back)
     wanted = {each.name for layer in scene.view_layers for each in layer.objects}
-    wanted -= {each.name for each in front.all_objects} | {scene.camera.name}
+    wanted -= {each.name for each in front.all_objects} | {frame_setup.active_camera(scene).name}
     for each in [each for each in back.objects if each.name not in wanted]:
         back.objects.unlink(each)
     for name in sorted(wanted - {each.name for each in back.objects}):

@@ -55,7 +55,7 @@ def take_out(scene: bpy.types.Scene) -> None:
     """Give the render's picture back to whatever the disk's feeds, and remove the disk's nodes."""
     tree = find_tree(scene)
     node = find_node(tree, disk_sync.DISK) if tree is not None else None
-    if node is not None:
+    if tree is not None and node is not None:
         tree_editing.give_back(tree, node, disk_group.BEHIND)
         disk_sync.remove(tree)
     lens_tree.release(scene)

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -90,8 +91,8 @@ def write(camera: bpy.types.Camera, values: Mapping[str, object]) -> None:
         camera.update_tag()
 
 
-def _same(present: object, value: object) -> bool:
-    return tuple(present) == value if isinstance(value, tuple) else present == value
+def _same(present: Any, value: object) -> bool:
+    return bool(tuple(present) == value if isinstance(value, tuple) else present == value)
 
 
 def device_problem(scene: bpy.types.Scene) -> SceneError | None:
@@ -99,7 +100,7 @@ def device_problem(scene: bpy.types.Scene) -> SceneError | None:
     if scene.cycles.device != "GPU":
         return None
     addon = bpy.context.preferences.addons.get("cycles")
-    kind = addon.preferences.compute_device_type if addon is not None else "NONE"
+    kind = addon.preferences.compute_device_type if addon is not None and addon.preferences is not None else "NONE"
     if kind in DEVICES_WITH_SHADERS:
         return None
     return SceneError(

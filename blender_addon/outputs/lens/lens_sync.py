@@ -71,21 +71,6 @@ def check(scene: bpy.types.Scene) -> None:
         )
 
 
-def check_camera(scene: bpy.types.Scene) -> None:
-    """Refuse a scene without a camera.
-
-    Raises
-    ------
-    SceneError
-        If there is none.
-    """
-    if scene.camera is None or scene.camera.type != "CAMERA":
-        raise SceneError(
-            f'Scene "{scene.name}" has no camera: add one, or choose one in Scene Properties > Scene.',
-            code="camera.none",
-        )
-
-
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
     """Return the data of the scene's camera, converted if it is not yet.
 
@@ -94,9 +79,9 @@ def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
     SceneError
         If there is no camera, or it cannot be converted.
     """
-    check_camera(scene)
-    lens_camera.convert(scene.camera.data)
-    return scene.camera.data
+    camera: bpy.types.Camera = frame_setup.active_camera(scene).data
+    lens_camera.convert(camera)
+    return camera
 
 
 def break_camera(scene: bpy.types.Scene) -> None:

@@ -42,7 +42,7 @@ class LensOutput(Output):
         tree = find_tree(scene)
         if tree is not None and disk_sync.wanted_hole(scene) is not None:
             check_shared(scene, tree)
-        lens_sync.check_camera(scene)
+        frame_setup.active_camera(scene)
         for camera in lens_camera.cameras_of(scene):
             lens_camera.check(camera)
         lens_shader.bytecode(uses_map=False)
@@ -131,7 +131,8 @@ class LensOutput(Output):
             lens_disk.point_at_passes(scene)
         warnings = lens_objects.warnings(scene, depsgraph, frame)
         if scene.umbra.foreground_scene is not None:
-            foreground.copy_lens(scene.umbra.foreground_scene, scene.camera.evaluated_get(depsgraph).data)
+            camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
+            foreground.copy_lens(scene.umbra.foreground_scene, camera.data)
         path = _exit_map(scene, frame).path if lens_sync.uses_maps(scene) else None
         lens_sync.show(scene, frame, path)
         return warnings

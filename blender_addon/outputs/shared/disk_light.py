@@ -25,6 +25,8 @@ _STRENGTH = "Strength"
 
 RINGS, SEGMENTS = 48, 96
 
+Array = NDArray[np.float64]
+
 
 def find(hole: bpy.types.Object | None) -> bpy.types.Object | None:
     """The light of a hole's disk."""
@@ -38,10 +40,10 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     if hole is None or hole.library is not None:
         return
     settings = hole.umbra.disk
-    light = find(hole)
+    present = find(hole)
     if not (settings.enabled and settings.light):
-        if light is not None:
-            _remove(light)
+        if present is not None:
+            _remove(present)
         return
     frame = scene.frame_current
     spin, disk = disk_animation.disk_at(hole, frame)
@@ -51,8 +53,7 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
         look.validate()
     except physics.BlackHoleError:
         return  # whoever reads the shot says so
-    if light is None:
-        light = _add(scene, hole)
+    light = present or _add(scene, hole)
     picture = settings.texture if disk_properties.shows_picture(settings) else None
     made_from = repr((spin, disk, look, None if picture is None else (picture.name, tuple(picture.size))))
     if light.data.get(_MADE_FROM) != made_from:
@@ -61,7 +62,10 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     scale = disk_animation.value_at(hole, "umbra.mass_scale", frame)
     if not all(math.isclose(each, scale, rel_tol=1e-6) for each in light.scale):
         light.scale = (scale,) * 3
-    strength = light.active_material.node_tree.nodes[_STRENGTH].inputs["Strength"]
+    material = light.active_material
+    if material is None:
+        return
+    strength = material.node_tree.nodes[_STRENGTH].inputs["Strength"]
     wanted = disk_animation.value_at(hole, "umbra.disk.light_strength", frame)
     if not math.isclose(strength.default_value, wanted, rel_tol=1e-6, abs_tol=1e-9):
         strength.default_value = wanted
@@ -69,13 +73,13 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
 
 def follow(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     """Bring the light to the scene's frame, where settings of the hole have keyframes."""
-    if find(hole) is not None and disk_animation.keyframes(hole):
+    if hole is not None and find(hole) is not None and disk_animation.keyframes(hole):
         refresh(scene, hole)
 
 
 def radiance(
-    disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: NDArray, rows: NDArray | None = None
-) -> NDArray:
+    disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: Array, rows: Array | None = None
+) -> Array:
     """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
 
     `rows`, shape (rows, 4), are the means round the disk of the picture whose colors it has.
@@ -95,7 +99,7 @@ def radiance(
 
 
 def _fill(
-    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, rows: NDArray | None
+    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, rows: Array | None
 ) -> None:
     """Make the annulus, in units of M, its light at each vertex."""
     radii = np.geomspace(*disk.radii(spin), RINGS)

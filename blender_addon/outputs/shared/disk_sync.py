@@ -39,6 +39,8 @@ def update(scene: bpy.types.Scene, hole: bpy.types.Object, node: bpy.types.Node)
     """Carry the disk's settings into its node: values, and drivers where they are animated."""
     tree = node.id_data
     disk = disk_properties.disk_of(hole.umbra.disk)
+    if disk is None:
+        return
     try:
         disk.validate(hole.umbra.spin, scene.umbra.method)
     except physics.BlackHoleError:
@@ -212,7 +214,7 @@ def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.t
     }
     for name, image in images.items():
         table = find_node(tree, TABLE_ROLES[name])
-        if table.image != image:
+        if table is not None and table.image != image:
             table.image = image
 
 
@@ -265,9 +267,14 @@ def _set(
 ) -> None:
     """Give a socket a value and, with an expression, a driver; the expression may use a property as `a`."""
     path = socket.path_from_id("default_value")
-    present = tree.animation_data.drivers.find(path) if tree.animation_data is not None else None
-    if present is not None and not (expression is not None and _drives(present, expression, source)):
-        tree.animation_data.drivers.remove(present)
+    animation = tree.animation_data
+    present = animation.drivers.find(path) if animation is not None else None
+    if (
+        animation is not None
+        and present is not None
+        and not (expression is not None and _drives(present, expression, source))
+    ):
+        animation.drivers.remove(present)
         present = None
     if present is None and expression is not None:
         driver = socket.driver_add("default_value").driver

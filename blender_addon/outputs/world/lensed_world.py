@@ -47,6 +47,12 @@ def group_node(world: bpy.types.World | None) -> bpy.types.Node | None:
     return next((node for node in nodes if node.type == "GROUP" and world_group.is_group(node.node_tree)), None)
 
 
+def group_of(world: bpy.types.World | None) -> bpy.types.NodeTree | None:
+    """The group in a World."""
+    node = group_node(world)
+    return None if node is None else node.node_tree
+
+
 def check(scene: bpy.types.Scene) -> None:
     """Refuse a scene that has no sky that could be lensed.
 
@@ -78,9 +84,9 @@ def install(scene: bpy.types.Scene) -> bpy.types.Node:
     SceneError
         The scene has no sky that could be lensed.
     """
-    present = lensed_world(scene)
+    present = group_node(lensed_world(scene))
     if present is not None:
-        return group_node(present)
+        return present
     forget(scene)
     of_image = scene.umbra.environment_source == "IMAGE"
     made = _world_of_image(scene) if of_image else _copy_of_world(scene)

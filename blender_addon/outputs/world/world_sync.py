@@ -24,7 +24,8 @@ def refresh(scene: bpy.types.Scene) -> None:
     world = lensed_world.lensed_world(scene)
     shows_image = scene.umbra.environment_source == "IMAGE"
     if world is not None and scene.get(lensed_world.IS_BENT) and _is_stale(scene, world, shows_image=shows_image):
-        values = look_of_group(lensed_world.group_node(world))
+        node = lensed_world.group_node(world)
+        values = {} if node is None else look_of_group(node)
         before = scene.get(lensed_world.BEFORE)
         try:
             lensed_world.remove(scene)
@@ -54,7 +55,7 @@ def _is_stale(scene: bpy.types.Scene, world: bpy.types.World, *, shows_image: bo
 def _group(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
     """The group in the scene's lensed World, whole, and its own: a copy of the World shares it at first."""
     node = lensed_world.group_node(lensed_world.lensed_world(scene))
-    if node is None:
+    if node is None or node.node_tree is None:
         return None
     if node.node_tree.library is None:
         if node.node_tree.users > 1:
@@ -83,9 +84,8 @@ def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
     return None if shared else image
 
 
-def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
-    """The image that reads the scene's maps: the one in use, or another."""
-    world = lensed_world.lensed_world(scene)
+def _file_image(world: bpy.types.World) -> bpy.types.Image:
+    """The image that reads the maps of a lensed World: the one in use, or another."""
     present = _own(world, lensed_world.FILE_IMAGE)
     if present is None:
         present = map_image(FILE_IMAGE_NAME)
@@ -95,9 +95,10 @@ def _file_image(scene: bpy.types.Scene) -> bpy.types.Image:
 
 
 def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
-    if lensed_world.lensed_world(scene) is None:
+    world = lensed_world.lensed_world(scene)
+    if world is None:
         return
-    image = _file_image(scene)
+    image = _file_image(world)
     if image.filepath != path:
         image.filepath = path
     _point(scene, image)
@@ -120,15 +121,17 @@ def point_at_nothing(scene: bpy.types.Scene) -> None:
 
 def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
     """Let the World read the same files from another folder."""
-    if lensed_world.lensed_world(scene) is not None:
-        name = bpy.path.basename(_file_image(scene).filepath)
+    world = lensed_world.lensed_world(scene)
+    if world is not None:
+        name = bpy.path.basename(_file_image(world).filepath)
         _point_at_path(scene, blender_folder + name)
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:
     """Let Blender read the maps anew from their files."""
-    if lensed_world.lensed_world(scene) is not None:
-        _file_image(scene).reload()
+    world = lensed_world.lensed_world(scene)
+    if world is not None:
+        _file_image(world).reload()
 
 
 # --- the preview's map ----------------------------------------------------------------------------
@@ -147,9 +150,10 @@ def live_images(world: bpy.types.World) -> list[bpy.types.Image]:
 def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
     """The image of the preview's map that the World reads now."""
     world = lensed_world.lensed_world(scene)
-    if world is None:
+    group = lensed_world.group_of(world)
+    if world is None or group is None:
         return None
-    read = {each.image for each in map_nodes(lensed_world.group_node(world).node_tree)}
+    read = {each.image for each in map_nodes(group)}
     image = read.pop() if len(read) == 1 else None
     return image if image in live_images(world) else None
 
@@ -157,7 +161,8 @@ def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
 def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
     """Let the World read a map that is in memory; always through the same image, or through two in turn."""
     world = lensed_world.lensed_world(scene)
-    if world is None:
+    tree = lensed_world.group_of(world)
+    if world is None or tree is None:
         return
     shown = _shown_live(scene)
     key = _next_key(scene, world, shown)
@@ -170,7 +175,6 @@ def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
         world[key] = image
     image.pixels.foreach_set(np.ravel(made.texture))
     image.update()
-    tree = lensed_world.group_node(world).node_tree
     if shown is None or tree.users > 1:
         _point(scene, image)
     elif shown != image:  # looking after the group, too, would take longer than the map

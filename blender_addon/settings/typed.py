@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The types of the settings: what `object.umbra`, its `disk` and `scene.umbra` hold.
+
+Blender makes properties of annotations that are calls, which a type checker cannot read, so they are declared here as
+well. A test compares the two.
+"""
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+if TYPE_CHECKING:
+    from bpy.types import PropertyGroup as _Group
+else:
+    _Group = object  # these classes are not Blender's
+
+
+class DiskSettings(_Group):
+    """What `UmbraDiskProperties` holds."""
+
+    enabled: bool
+    inner_at_isco: bool
+    inner_radius: float
+    outer_radius: float
+    retrograde: bool
+    crossings: int
+    profile: str
+    exponent: float
+    temperature: float
+    doppler_color: float
+    doppler_brightness: float
+    beaming: str
+    color_variation: float
+    falloff: float
+    exposure: float
+    opacity: float
+    streaks: float
+    clumps: float
+    inner_softness: float
+    outer_softness: float
+    gain: float
+    turning_speed: float
+    texture: bpy.types.Image | None
+    texture_use: str
+    light: bool
+    light_strength: float
+    innermost_orbit: float
+    flux_factor: float
+
+
+class HoleSettings(_Group):
+    """What `UmbraHoleProperties` holds."""
+
+    is_black_hole: bool
+    spin: float
+    mass_scale: float
+    motion: str
+    speed_of_light: float
+    disk: DiskSettings
+
+
+class SceneSettings(_Group):
+    """What `UmbraSceneProperties` holds."""
+
+    active_hole: bpy.types.Object | None
+    output: str
+    lens_rays: str
+    sphere_radius: float
+    redshift_color: float
+    redshift_brightness: float
+    sky_temperature: float
+    live_preview: bool
+    foreground: bpy.types.Collection | None
+    foreground_scene: bpy.types.Scene | None
+    cpu_fallback: bool
+    map_folder: str
+    supersampling: str
+    quality: str
+    tolerance: float
+    interpolation: float
+    method: str
+    environment_source: str
+    environment_image: bpy.types.Image | None
+    auto_bake: bool
