@@ -32,8 +32,8 @@ import bpy
 
 from ..core.physics_api import color
 from . import black_hole_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+from .builder import TreeBuilder
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Black Hole"
 GROUP_VERSION = 2
@@ -147,18 +147,18 @@ INPUTS = (
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
-def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+def _build(builder: TreeBuilder, values: Values) -> Values:
     inputs = black_hole_nodes.GroupInputs(
-        render=sockets[RENDER.name],
-        environment=sockets[ENVIRONMENT.name],
-        warp_map=sockets[WARP_MAP.name],
-        rotation=sockets[ROTATION.name],
-        strength=sockets[STRENGTH.name],
-        exposure=sockets[EXPOSURE.name],
-        redshift_color=sockets[REDSHIFT_COLOR.name],
-        redshift_brightness=sockets[REDSHIFT_BRIGHTNESS.name],
-        temperature=sockets[TEMPERATURE.name],
-        disk=sockets[DISK.name],
+        render=values[RENDER.name],
+        environment=values[ENVIRONMENT.name],
+        warp_map=values[WARP_MAP.name],
+        rotation=values[ROTATION.name],
+        strength=values[STRENGTH.name],
+        exposure=values[EXPOSURE.name],
+        redshift_color=values[REDSHIFT_COLOR.name],
+        redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
+        temperature=values[TEMPERATURE.name],
+        disk=values[DISK.name],
     )
     results = black_hole_nodes.build(builder, inputs)
     return {
@@ -169,7 +169,7 @@ def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket
     }
 
 
-_GROUP = StampedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
+_GROUP = VersionedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
 
 is_group = _GROUP.owns
 is_current = _GROUP.is_current

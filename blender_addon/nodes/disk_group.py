@@ -19,8 +19,8 @@ import bpy
 
 from ..core.physics_api import disk_look
 from . import disk_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+from .builder import Float, TreeBuilder, Vector
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Disk"
 GROUP_VERSION = 2
@@ -131,7 +131,7 @@ def pass_names(images: int) -> tuple[str, ...]:
 
 
 @cache
-def group_of(images: int, picture: bool = False) -> StampedGroup:
+def group_of(images: int, picture: bool = False) -> VersionedGroup:
     """The group for so many images of a disk, with streaks and clumps or with a picture on it; see `ensure`."""
     kind = f"{images} Picture" if picture else f"{images}"
     names = pass_names(images)
@@ -140,36 +140,35 @@ def group_of(images: int, picture: bool = False) -> StampedGroup:
         for number, name in enumerate(names, start=1)
     )
 
-    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+    def build(builder: TreeBuilder, values: Values) -> Values:
         inner = image_group(picture).ensure()
-        light: Socket | None = None
-        through: Socket | None = None
+        light = through = None
         for name in names:
             node = builder.node(GROUP_NODE_TYPE, name)
             node.node_tree = inner
-            builder.feed(node.inputs[PASS], sockets[name])
+            builder.feed(node.inputs[PASS], values[name])
             for spec in _INPUTS:
-                builder.feed(node.inputs[spec.name], sockets[spec.name])
+                builder.feed(node.inputs[spec.name], values[spec.name])
             if light is not None:
                 builder.feed(node.inputs[LIGHT], light)
                 builder.feed(node.inputs[THROUGH], through)
-            light, through = node.outputs[LIGHT], node.outputs[THROUGH]
-        given = [sockets[name] for name in names]
-        disk, image = disk_nodes.build_whole(builder, given, sockets[BEHIND], light, through)
+            light, through = Vector(builder, node.outputs[LIGHT]), Float(builder, node.outputs[THROUGH])
+        given = [values[name] for name in names]
+        disk, image = disk_nodes.build_whole(builder, given, values[BEHIND], light, through)
         return {OUTPUT: disk, IMAGE: image}
 
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
-    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
+    return VersionedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
 
 
 @cache
-def image_group(picture: bool) -> StampedGroup:
+def image_group(picture: bool) -> VersionedGroup:
     """The group that draws one image of the disk."""
     kind = "Image Picture" if picture else "Image"
 
-    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
-        inputs = _disk_inputs(sockets)
-        light, through = disk_nodes.build_image(builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture)
+    def build(builder: TreeBuilder, values: Values) -> Values:
+        inputs = _disk_inputs(values)
+        light, through = disk_nodes.build_image(builder, inputs, values[LIGHT], values[THROUGH], picture=picture)
         return {LIGHT: light, THROUGH: through}
 
     inputs = (
@@ -183,7 +182,7 @@ def image_group(picture: bool) -> StampedGroup:
         SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that is left", in_out="OUTPUT"),
     )
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
-    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
+    return VersionedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
 
 
 def ensure(images: int, picture: bool) -> bpy.types.NodeTree:
@@ -206,22 +205,22 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
     return tree is not None and any(key.startswith(VERSION_KEY) for key in tree.keys())  # noqa: SIM118
 
 
-def _disk_inputs(sockets: dict[str, Socket]) -> disk_nodes.DiskInputs:
+def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
-        disk_pass=sockets[PASS],
-        colors=sockets[COLORS],
-        texture=sockets[TEXTURE],
-        phase=sockets[PHASE],
-        first_turn=sockets[FIRST_TURN],
-        second_turn=sockets[SECOND_TURN],
-        period=sockets[PERIOD],
-        spin=sockets[SPIN],
-        direction=sockets[DIRECTION],
-        inner=sockets[INNER],
-        outer=sockets[OUTER],
-        innermost=sockets[INNERMOST],
-        flux_factor=sockets[FLUX_FACTOR],
-        page_thorne=sockets[PAGE_THORNE],
-        beaming=sockets[BEAMING],
-        **{field: sockets[name] for field, name in LOOK_SOCKETS.items()},
+        disk_pass=values[PASS],
+        colors=values[COLORS],
+        texture=values[TEXTURE],
+        phase=values[PHASE],
+        first_turn=values[FIRST_TURN],
+        second_turn=values[SECOND_TURN],
+        period=values[PERIOD],
+        spin=values[SPIN],
+        direction=values[DIRECTION],
+        inner=values[INNER],
+        outer=values[OUTER],
+        innermost=values[INNERMOST],
+        flux_factor=values[FLUX_FACTOR],
+        page_thorne=values[PAGE_THORNE],
+        beaming=values[BEAMING],
+        **{field: values[name] for field, name in LOOK_SOCKETS.items()},
     )

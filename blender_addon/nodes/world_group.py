@@ -11,8 +11,8 @@ from __future__ import annotations
 import bpy
 
 from . import black_hole_group, world_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import SocketSpec, StampedGroup
+from .builder import TreeBuilder
+from .versioned_group import SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra World"
 GROUP_VERSION = 1
@@ -58,8 +58,16 @@ INPUTS = (
 OUTPUTS = (VECTOR, TINT, FAULT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
 
 
-def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
-    results = world_nodes.build(builder, world_nodes.WorldInputs(*(sockets[spec.name] for spec in INPUTS)))
+def _build(builder: TreeBuilder, values: Values) -> Values:
+    inputs = world_nodes.WorldInputs(
+        lensing=values[LENSING.name],
+        other_rays=values[OTHER_RAYS.name],
+        exposure=values[black_hole_group.EXPOSURE.name],
+        redshift_color=values[black_hole_group.REDSHIFT_COLOR.name],
+        redshift_brightness=values[black_hole_group.REDSHIFT_BRIGHTNESS.name],
+        temperature=values[black_hole_group.TEMPERATURE.name],
+    )
+    results = world_nodes.build(builder, inputs)
     return {
         VECTOR.name: results.vector,
         TINT.name: results.tint,
@@ -69,7 +77,7 @@ def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket
     }
 
 
-_GROUP = StampedGroup(
+_GROUP = VersionedGroup(
     GROUP_NAME,
     GROUP_VERSION,
     VERSION_KEY,

@@ -6,13 +6,18 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import bpy
 
-from .builder import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder
+from .builder import TreeBuilder
+from .image_nodes import SETTINGS_ARE_SOCKETS
 
 BLENDER_KEY = "umbra_built_with_blender"
 CONTENT_KEY = "umbra_content"
+
+Values: TypeAlias = dict[str, Any]
+"""Name of a socket -> its `Float` or `Vector`."""
 
 TREE_TYPE = "CompositorNodeTree"
 GROUP_NODE_TYPE = "CompositorNodeGroup"
@@ -34,7 +39,7 @@ class SocketSpec:
 
 
 @dataclass(frozen=True)
-class StampedGroup:
+class VersionedGroup:
     """A kind of node group, of which a file has one unless `ensure` is told which is meant.
 
     `is_current` and `ensure` look into the group itself, so that a change by hand is found as well.
@@ -47,8 +52,8 @@ class StampedGroup:
     """The group's custom property that holds its version, and tells it from other groups."""
     inputs: tuple[SocketSpec, ...]
     outputs: tuple[SocketSpec, ...]
-    build: Callable[[TreeBuilder, dict[str, Socket]], dict[str, Socket]]
-    """Adds all nodes between the group's inputs and outputs, both by name."""
+    build: Callable[[TreeBuilder, Values], Values]
+    """Adds all nodes between the group's inputs and its outputs, given and returned by socket name."""
     former_names: dict[tuple[str, str], str] = field(default_factory=dict)
     """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
     tree_type: str = TREE_TYPE
@@ -101,13 +106,11 @@ class StampedGroup:
         for spec in self._match_interface(tree):
             _set_default_in_users(tree, spec)
         builder = TreeBuilder(tree)
-        group_input = builder.node("NodeGroupInput")
-        sockets = {socket.name: socket for socket in group_input.outputs}
-        results = self.build(builder, {spec.name: sockets[spec.name] for spec in self.inputs})
-        group_output = builder.node("NodeGroupOutput")
-        targets = {socket.name: socket for socket in group_output.inputs}
+        sockets = {socket.name: socket for socket in builder.node("NodeGroupInput").outputs}
+        results = self.build(builder, {spec.name: builder.value(sockets[spec.name]) for spec in self.inputs})
+        targets = {socket.name: socket for socket in builder.node("NodeGroupOutput").inputs}
         for spec in self.outputs:
-            tree.links.new(results[spec.name], targets[spec.name])
+            builder.feed(targets[spec.name], results[spec.name])
         tree[self.version_key] = self.version
         tree[BLENDER_KEY] = _blender_series()
         tree[CONTENT_KEY] = _fingerprint(tree)
