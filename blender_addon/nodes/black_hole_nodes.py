@@ -12,20 +12,8 @@ import math
 from dataclasses import dataclass
 
 from ..core.physics_api import reference_render
-from .builder import (
-    Float,
-    TreeBuilder,
-    Vector,
-    atan2,
-    clamp,
-    combine,
-    cos,
-    multiply_add,
-    nearest_integer,
-    sin,
-    sqrt,
-    where,
-)
+from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_integer, sin, sqrt, where
+from .builder import Float, TreeBuilder, Vector
 from .image_lookup import sample_bilinearly
 from .image_nodes import separate_color
 from .redshift import redshift_gain

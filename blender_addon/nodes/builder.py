@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node trees written as expressions: `a * b + c` adds a Multiply and an Add node.
 
-`Float` and `Vector` stand for what a socket will hold when the tree is evaluated. Operators and the functions of this
-module add nodes and return the values of their outputs. Nodes are added in the order in which Python evaluates an
-expression, and with their operands in the order in which they are written.
+`Float` and `Vector` stand for what a socket will hold when the tree is evaluated. Their operators, the functions in
+`arithmetic` and those in `image_nodes` add nodes and return the values of their outputs. Nodes are added in the order
+in which Python evaluates an expression, with their operands in the order in which they are written.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Self, TypeAlias, overload
 
@@ -73,7 +72,7 @@ class TreeBuilder:
         return node
 
     def value(self, socket: Socket) -> Float | Vector:
-        """Wrap an output socket: a float as `Float`, a vector or color as `Vector`."""
+        """Wrap an output socket: a float as `Float`, a vector or a color as `Vector`."""
         return Float(self, socket) if socket.type == "VALUE" else Vector(self, socket)
 
     def feed(self, target: Socket, operand: Operand) -> None:
@@ -102,7 +101,7 @@ class TreeBuilder:
         return node
 
     def combine(self, x: Number, y: Number, z: Number) -> Vector:
-        """Add a Combine XYZ node; all of its components may be constants."""
+        """Add a Combine XYZ node."""
         node = self.node("ShaderNodeCombineXYZ")
         for target, operand in zip(node.inputs, (x, y, z), strict=True):
             self.feed(target, operand)
@@ -246,97 +245,3 @@ class Vector(Value):
         self.builder.feed(node.inputs[0], self)
         x, y, z = (Float(self.builder, socket) for socket in node.outputs)
         return x, y, z
-
-
-def _builder_of(*operands: Operand) -> TreeBuilder:
-    return next(operand.builder for operand in operands if isinstance(operand, Value))
-
-
-def _function(operation: str) -> Callable[[Float], Float]:
-    """Return the function of one number that a Math node calculates."""
-
-    def apply(value: Float) -> Float:
-        return value.builder.math(operation, value)
-
-    return apply
-
-
-acos = _function("ARCCOSINE")
-cos = _function("COSINE")
-exp = _function("EXPONENT")
-floor = _function("FLOOR")
-fraction = _function("FRACT")
-nearest_integer = _function("ROUND")
-sin = _function("SINE")
-sqrt = _function("SQRT")
-tanh = _function("TANH")
-
-
-def log(value: Float) -> Float:
-    """Natural logarithm."""
-    return value.builder.math("LOGARITHM", value, math.e)
-
-
-def atan2(y: Float, x: Float) -> Float:
-    """Angle of the point (x, y) from the x axis, -pi to pi."""
-    return y.builder.math("ARCTAN2", y, x)
-
-
-def minimum(one: Number, other: Number) -> Float:
-    """The smaller of two numbers; `one` where the other is NaN."""
-    return _builder_of(one, other).math("MINIMUM", one, other)
-
-
-def maximum(one: Number, other: Number) -> Float:
-    """The larger of two numbers; `one` where the other is NaN."""
-    return _builder_of(one, other).math("MAXIMUM", one, other)
-
-
-def clamp(value: Float, low: Number, high: Number) -> Float:
-    """The value within `low` and `high`; `low` where it is NaN."""
-    return minimum(high, maximum(low, value))
-
-
-@overload
-def multiply_add(value: Number, factor: Number, addend: Number) -> Float: ...
-@overload
-def multiply_add(value: Vector, factor: Number | Direction, addend: Direction) -> Vector: ...
-def multiply_add(value: Number | Vector, factor: Operand, addend: Operand) -> Float | Vector:
-    """`value * factor + addend` in one node; with a vector, component by component."""
-    if isinstance(value, Vector):
-        return value._apply("MULTIPLY_ADD", factor, addend)
-    return _builder_of(value, factor, addend).math("MULTIPLY_ADD", value, factor, addend)
-
-
-@overload
-def mix(share: Float, start: Number, end: Number) -> Float: ...
-@overload
-def mix(share: Float, start: Direction, end: Direction) -> Vector: ...
-def mix(share: Float, start: Number | Direction, end: Number | Direction) -> Float | Vector:
-    """`start` where the share is 0, `end` where it is 1, in proportion in between; exact at both ends."""
-    vectors = any(isinstance(each, Vector | tuple) for each in (start, end))
-    builder = share.builder
-    node = builder.node("ShaderNodeMix")
-    # The node has sockets of all of its data types; those of the others stay unused.
-    kind = "Vector" if vectors else "Float"
-    node.data_type = kind.upper()
-    node.factor_mode = "UNIFORM"
-    node.clamp_factor = True
-    inputs = {socket.identifier: socket for socket in node.inputs}
-    for name, operand in zip(("Factor_Float", f"A_{kind}", f"B_{kind}"), (share, start, end), strict=True):
-        builder.feed(inputs[name], operand)
-    return builder.value(next(socket for socket in node.outputs if socket.identifier == f"Result_{kind}"))
-
-
-@overload
-def where(condition: Float, chosen: Number, otherwise: Number) -> Float: ...
-@overload
-def where(condition: Float, chosen: Direction, otherwise: Direction) -> Vector: ...
-def where(condition: Float, chosen: Number | Direction, otherwise: Number | Direction) -> Float | Vector:
-    """`chosen` where the condition is 1, `otherwise` where it is 0, in proportion in between."""
-    return mix(condition, otherwise, chosen)  # type: ignore[call-overload, no-any-return]
-
-
-def combine(x: Number, y: Number, z: Number) -> Vector:
-    """Vector of three numbers, at least one of them not a constant."""
-    return _builder_of(x, y, z).combine(x, y, z)

@@ -4,11 +4,10 @@
 They draw a disk from the passes that were baked along with a warp map: for the input Disk of the group "Umbra Black
 Hole", or over the picture of a camera that bends its rays. Pass 1 and so on must be Image nodes with the baked EXRs,
 Non-Color and Channel Packed like the warp map; Colors is a table, and Texture is a picture with azimuth across and
-ln(radius) down, see `disk_images`.
+ln(radius) down (see `disk_images`).
 
-A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
-images, and for each way to use the texture; a file has those that it needs. Inside, each image is drawn by another
-group, "Umbra Disk Image".
+The compositor evaluates all nodes of a group, needed or not. So there is one group per number of images and per way to
+use the texture; a file has those that it needs. Inside, each image is drawn by another group, "Umbra Disk Image".
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import bpy
 
 from ..core.physics_api import disk_look
 from . import disk_nodes
-from .builder import Float, TreeBuilder, Vector
+from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Disk"
@@ -27,7 +26,7 @@ GROUP_VERSION = 2
 """Raised whenever the groups' sockets or nodes change; groups with another number are rebuilt."""
 
 VERSION_KEY = "umbra_disk_version"
-"""Of the one group that there was in version 1; those of today have the kind behind it."""
+"""Key of the single group of version 1; since version 2 the kind of the group is appended."""
 
 
 def _picture(name: str, description: str) -> SocketSpec:
@@ -126,13 +125,26 @@ _OUTPUTS = (
 
 
 def pass_names(images: int) -> tuple[str, ...]:
-    """Names of the sockets of so many passes."""
+    """Names of the sockets of this many passes."""
     return tuple(f"Pass {number}" for number in range(1, images + 1))
 
 
 @cache
 def group_of(images: int, picture: bool = False) -> VersionedGroup:
-    """The group for so many images of a disk, with streaks and clumps or with a picture on it; see `ensure`."""
+    """Return the kind of group for a number of images of the disk.
+
+    Parameters
+    ----------
+    images : int
+        Number of passes, from 1.
+    picture : bool
+        Whether the texture's colors are the disk's; otherwise it holds streaks and clumps.
+
+    Returns
+    -------
+    VersionedGroup
+        Its nodes use `image_group(picture)`; `ensure` builds both.
+    """
     kind = f"{images} Picture" if picture else f"{images}"
     names = pass_names(images)
     passes = tuple(
@@ -142,19 +154,16 @@ def group_of(images: int, picture: bool = False) -> VersionedGroup:
 
     def build(builder: TreeBuilder, values: Values) -> Values:
         inner = image_group(picture).ensure()
-        light = through = None
+        shared = {spec.name: values[spec.name] for spec in _INPUTS}
+        so_far: Values = {LIGHT: (0.0, 0.0, 0.0), THROUGH: 1.0}
         for name in names:
             node = builder.node(GROUP_NODE_TYPE, name)
             node.node_tree = inner
-            builder.feed(node.inputs[PASS], values[name])
-            for spec in _INPUTS:
-                builder.feed(node.inputs[spec.name], values[spec.name])
-            if light is not None:
-                builder.feed(node.inputs[LIGHT], light)
-                builder.feed(node.inputs[THROUGH], through)
-            light, through = Vector(builder, node.outputs[LIGHT]), Float(builder, node.outputs[THROUGH])
-        given = [values[name] for name in names]
-        disk, image = disk_nodes.build_whole(builder, given, values[BEHIND], light, through)
+            for socket, value in {PASS: values[name], **shared, **so_far}.items():
+                builder.feed(node.inputs[socket], value)
+            so_far = {socket: builder.value(node.outputs[socket]) for socket in so_far}
+        passes = [values[name] for name in names]
+        disk, image = disk_nodes.build_whole(builder, passes, values[BEHIND], so_far[LIGHT], so_far[THROUGH])
         return {OUTPUT: disk, IMAGE: image}
 
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
@@ -163,7 +172,7 @@ def group_of(images: int, picture: bool = False) -> VersionedGroup:
 
 @cache
 def image_group(picture: bool) -> VersionedGroup:
-    """The group that draws one image of the disk."""
+    """Return the kind of group that draws one image of the disk."""
     kind = "Image Picture" if picture else "Image"
 
     def build(builder: TreeBuilder, values: Values) -> Values:
@@ -186,13 +195,13 @@ def image_group(picture: bool) -> VersionedGroup:
 
 
 def ensure(images: int, picture: bool) -> bpy.types.NodeTree:
-    """The group for so many images, whole and of this version, and what is inside of it."""
+    """Return the group for a number of images, and build it and the group inside it if they are not current."""
     image_group(picture).ensure()
     return group_of(images, picture).ensure()
 
 
 def remove_unused() -> None:
-    """Remove those of the groups that nothing uses any more, and then those that were inside of them."""
+    """Remove the groups that nothing uses, then those that were used only inside them."""
     for inside in (False, True):
         for tree in list(bpy.data.node_groups):
             is_inside = any(image_group(picture).owns(tree) for picture in (False, True))
@@ -201,7 +210,7 @@ def remove_unused() -> None:
 
 
 def owns(tree: bpy.types.NodeTree | None) -> bool:
-    """Whether a node tree is one of these groups, of whatever kind and version."""
+    """Whether a node tree is one of these groups, whatever its kind and version."""
     return tree is not None and any(key.startswith(VERSION_KEY) for key in tree.keys())  # noqa: SIM118
 
 

@@ -14,23 +14,8 @@ from dataclasses import dataclass
 from functools import reduce
 
 from ..core.physics_api import disk_look, reference_render
-from .builder import (
-    Float,
-    TreeBuilder,
-    Vector,
-    acos,
-    clamp,
-    combine,
-    cos,
-    fraction,
-    log,
-    maximum,
-    minimum,
-    multiply_add,
-    sin,
-    sqrt,
-    where,
-)
+from .arithmetic import acos, clamp, combine, cos, fraction, log, maximum, minimum, multiply_add, sin, sqrt, where
+from .builder import Float, TreeBuilder, Vector
 from .image_lookup import sample_bilinearly, sample_with_alpha
 from .image_nodes import combine_color, image_size, separate_color
 from .redshift import redshift_gain

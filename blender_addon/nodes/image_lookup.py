@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from .builder import Float, Number, Vector, clamp, combine, floor, maximum, mix, multiply_add
+from .arithmetic import clamp, combine, floor, maximum, mix, multiply_add
+from .builder import Float, Number, Vector
 from .image_nodes import SETTINGS_ARE_SOCKETS, image_size, map_uv, separate_color
 
 

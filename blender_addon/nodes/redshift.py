@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from ..core.physics_api import color
-from .builder import Float, Number, Vector, combine, exp, log, maximum, multiply_add, tanh
+from .arithmetic import combine, exp, log, maximum, multiply_add, tanh
+from .builder import Float, Number, Vector
 
 
 def redshift_gain(one_plus_z: Float, amount: Float, brightness_amount: Number, temperature: Float) -> Vector:

@@ -6,15 +6,9 @@ from __future__ import annotations
 from itertools import product
 
 from ..core.physics_api import reference_render
-from .builder import Float, TreeBuilder, Vector, multiply_add, where
-from .image_nodes import (
-    SETTINGS_ARE_SOCKETS,
-    image_size,
-    render_area,
-    scale_by,
-    scale_to_render,
-    translate,
-)
+from .arithmetic import multiply_add, where
+from .builder import Float, TreeBuilder, Vector
+from .image_nodes import SETTINGS_ARE_SOCKETS, image_size, render_area, scale_by, scale_to_render, translate
 
 _HALVINGS = 2
 """Two halvings and the last step by 2 reduce exactly up to 8:1: a map of 4x supersampling at half size."""

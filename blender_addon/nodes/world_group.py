@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader node group "Umbra World": its sockets, its version, and keeping it whole.
+"""The shader node group "Umbra World": its sockets and its version.
 
-Its Vector takes the place of Texture Coordinate > Generated in front of whatever makes the World's sky; its Tint
-multiplies, and its Fault is added to, the color that comes out of it. Each lensed World has a group of its own,
-because the map is read inside of it.
+Its Vector replaces Texture Coordinate > Generated as the input of the World's sky; the sky's color is multiplied by its
+Tint, and its Fault is added. Each lensed World has a group of its own, because the map is read inside the group.
 """
 
 from __future__ import annotations
@@ -93,10 +92,10 @@ is_current = _GROUP.is_current
 
 
 def new_group() -> bpy.types.NodeTree:
-    """A group of this kind, besides any that there are."""
+    """Add a group of this kind to the file, whether or not it has others."""
     return _GROUP.ensure(bpy.data.node_groups.new(GROUP_NAME, _GROUP.tree_type))
 
 
 def mend(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:
-    """A group, rebuilt in place unless it is whole and of this version; whether it reads a map is not kept."""
+    """Return the group, rebuilt in place unless it is current; image nodes of a rebuilt group have no map."""
     return _GROUP.ensure(tree)

@@ -14,22 +14,8 @@ from dataclasses import dataclass
 import bpy
 
 from ..core.physics_api import reference_render, world_map
-from .builder import (
-    Float,
-    Number,
-    TreeBuilder,
-    Vector,
-    atan2,
-    clamp,
-    floor,
-    log,
-    maximum,
-    minimum,
-    mix,
-    multiply_add,
-    sqrt,
-    where,
-)
+from .arithmetic import atan2, clamp, floor, log, maximum, minimum, mix, multiply_add, sqrt, where
+from .builder import Float, Number, TreeBuilder, Vector
 from .redshift import redshift_gain
 
 MAP_ROLE = "umbra_world_map"
