@@ -1,29 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The compositor node group "Umbra Black Hole": its sockets, its version, and keeping it whole.
+"""The compositor node group "Umbra Black Hole": its sockets and its version.
 
-What is outside must provide
-----------------------------
+What to link to its inputs
+--------------------------
 Render
-    The render with a transparent film (`scene.render.film_transparent = True`), that is the Image output of
-    a Render Layers node: premultiplied, of the render's size. May be left unlinked: then there is sky only.
+    The render with a transparent film (`scene.render.film_transparent = True`), which is the Image output of
+    a Render Layers node: premultiplied, of the render's size. If it is not linked, there is only sky.
 Environment
     An Image node with an equirectangular picture of any size, row by row as Blender shows it (zenith at the
     top), in the color space the file was made in (it is converted to scene-linear by Blender). Its alpha
-    is ignored. Unlinked the socket's own color is the sky, the same in all directions: a World with a
+    is ignored. If it is not linked, the socket's own color is the sky in all directions, like a World with a
     plain background color.
 Warp Map
     An Image node with the baked EXR, a single image or a sequence. The image must be Non-Color
     (`image.colorspace_settings.name`) and Channel Packed (`image.alpha_mode = "CHANNEL_PACKED"`). Its
-    size is the render's, or 2 or 4 times that. No other node may lie in between.
+    size is the render's, or 2 or 4 times that. It must be linked directly, without other nodes in between.
 Disk
-    The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. Unlinked there is none.
+    The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. If it is not linked, there is
+    no disk.
 Environment Rotation, Environment Strength
-    What the World's Mapping node (type Point) and its Background node say.
+    The values of the World's Mapping node (type Point) and of its Background node.
 
 The scene's compositor must work in full precision (`scene.render.compositor_precision = "FULL"`): half floats
 cannot hold texture coordinates. In background it must work on the CPU (`compositor_device = "CPU"`).
-
-Everything in here works on Blender's data alone, without operators or context.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ import bpy
 
 from ..core.physics_api import color
 from . import black_hole_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+from .builder import TreeBuilder
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Black Hole"
 GROUP_VERSION = 2
@@ -147,18 +146,18 @@ INPUTS = (
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
-def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+def _build(builder: TreeBuilder, values: Values) -> Values:
     inputs = black_hole_nodes.GroupInputs(
-        render=sockets[RENDER.name],
-        environment=sockets[ENVIRONMENT.name],
-        warp_map=sockets[WARP_MAP.name],
-        rotation=sockets[ROTATION.name],
-        strength=sockets[STRENGTH.name],
-        exposure=sockets[EXPOSURE.name],
-        redshift_color=sockets[REDSHIFT_COLOR.name],
-        redshift_brightness=sockets[REDSHIFT_BRIGHTNESS.name],
-        temperature=sockets[TEMPERATURE.name],
-        disk=sockets[DISK.name],
+        render=values[RENDER.name],
+        environment=values[ENVIRONMENT.name],
+        warp_map=values[WARP_MAP.name],
+        rotation=values[ROTATION.name],
+        strength=values[STRENGTH.name],
+        exposure=values[EXPOSURE.name],
+        redshift_color=values[REDSHIFT_COLOR.name],
+        redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
+        temperature=values[TEMPERATURE.name],
+        disk=values[DISK.name],
     )
     results = black_hole_nodes.build(builder, inputs)
     return {
@@ -169,7 +168,7 @@ def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket
     }
 
 
-_GROUP = StampedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
+_GROUP = VersionedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
 
 is_group = _GROUP.owns
 is_current = _GROUP.is_current
@@ -179,5 +178,5 @@ add_group_node = _GROUP.add_node
 
 
 def group_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
-    """All group nodes in a compositor tree (not in groups inside of it) that use the group."""
+    """Return the nodes of a compositor tree (not of groups inside it) that use the group."""
     return [node for node in tree.nodes if node.bl_idname == GROUP_NODE_TYPE and is_group(node.node_tree)]

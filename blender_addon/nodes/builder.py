@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing nodes down as expressions, with the differences between Blender 4.5 and 5.x hidden here.
+"""Node trees written as expressions: `a * b + c` adds a Multiply and an Add node.
 
-In 5.x most settings of compositor nodes became input sockets. Whatever depends on this is in this file; the
-code that builds the node group reads the same for both.
+`Float` and `Vector` stand for what a socket will hold when the tree is evaluated. Their operators, the functions in
+`arithmetic` and those in `image_nodes` add nodes and return the values of their outputs. Nodes are added in the order
+in which Python evaluates an expression, with their operands in the order in which they are written.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeAlias
+from typing import Self, TypeAlias, overload
 
 import bpy
 
-SETTINGS_ARE_SOCKETS = bpy.app.version >= (5, 0, 0)
-"""From 5.0 on, settings of compositor nodes are menu sockets; before, they were properties of the node."""
-
 Socket: TypeAlias = bpy.types.NodeSocket
-Value: TypeAlias = "Socket | float | Sequence[float]"
+Triple: TypeAlias = tuple[float, float, float]
+Number: TypeAlias = "Float | float"
+Direction: TypeAlias = "Vector | Triple"
+Operand: TypeAlias = "Value | float | Sequence[float]"
 
 _COLUMN_WIDTH = 190.0
 _ROW_HEIGHT = 190.0
@@ -26,12 +27,12 @@ _FRAME_GAP = 120.0
 
 
 class TreeBuilder:
-    """Adds nodes to a compositor tree; every method takes sockets or plain values and returns output sockets.
+    """Adds nodes to a tree, laid out from left to right, one frame after the other.
 
     Parameters
     ----------
     tree : bpy.types.NodeTree
-        A compositor node tree. Nodes are laid out from left to right, one frame after the other.
+        A compositor or shader node tree.
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
@@ -42,7 +43,7 @@ class TreeBuilder:
 
     @contextmanager
     def frame(self, label: str) -> Iterator[None]:
-        """Put the nodes made inside this context into a labeled frame."""
+        """Put the nodes added inside this context into a labeled frame."""
         self._close_columns()
         frame = self.tree.nodes.new("NodeFrame")
         frame.label = label
@@ -60,7 +61,7 @@ class TreeBuilder:
         self._count_in_frame = 0
 
     def node(self, kind: str, label: str = "") -> bpy.types.Node:
-        """Add a node of the given type at the next free place."""
+        """Add a node of the type `kind` at the next free place."""
         node = self.tree.nodes.new(kind)
         node.label = label
         column, row = divmod(self._count_in_frame, _NODES_IN_A_COLUMN)
@@ -70,187 +71,177 @@ class TreeBuilder:
         self._count_in_frame += 1
         return node
 
-    def feed(self, target: Socket, value: Value) -> None:
-        """Link a socket to an input, or set the input's own value."""
-        if isinstance(value, bpy.types.NodeSocket):
-            self.tree.links.new(value, target)
+    def value(self, socket: Socket) -> Float | Vector:
+        """Wrap an output socket: a float as `Float`, a vector or a color as `Vector`."""
+        return Float(self, socket) if socket.type == "VALUE" else Vector(self, socket)
+
+    def feed(self, target: Socket, operand: Operand) -> None:
+        """Link a value to an input socket, or set the input's own value to a constant."""
+        if isinstance(operand, Value):
+            self.tree.links.new(operand.socket, target)
         else:
-            target.default_value = value
+            target.default_value = operand
 
-    # Arithmetic
-    # ------------------------------------------------------------------------------------------------
-
-    def math(self, operation: str, *values: Value, label: str = "") -> Socket:
-        """Math node: one float for each pixel."""
-        node = self.node("ShaderNodeMath", label)
+    def math(self, operation: str, *operands: Number) -> Float:
+        """Add a Math node."""
+        node = self.node("ShaderNodeMath")
         node.operation = operation
-        for target, value in zip(node.inputs, values, strict=False):
-            self.feed(target, value)
-        return node.outputs[0]
+        for target, operand in zip(node.inputs, operands, strict=False):
+            self.feed(target, operand)
+        return Float(self, node.outputs[0])
 
-    def vector_math(self, operation: str, *values: Value, label: str = "") -> Socket:
-        """Vector Math node with a vector as its result."""
-        return self._vector_node(operation, values, label).outputs["Vector"]
-
-    def _vector_node(self, operation: str, values: Sequence[Value], label: str) -> bpy.types.Node:
-        node = self.node("ShaderNodeVectorMath", label)
+    def vector_math(self, operation: str, *operands: Operand, scale: Number | None = None) -> bpy.types.Node:
+        """Add a Vector Math node; its outputs are "Vector" and "Value"."""
+        node = self.node("ShaderNodeVectorMath")
         node.operation = operation
-        for target, value in zip(node.inputs, values, strict=False):
-            self.feed(target, value)
+        for target, operand in zip(node.inputs, operands, strict=False):
+            self.feed(target, operand)
+        if scale is not None:
+            self.feed(node.inputs["Scale"], scale)
         return node
 
-    def dot(self, one: Value, other: Value, label: str = "") -> Socket:
-        """Dot product of two vectors."""
-        return self._vector_node("DOT_PRODUCT", (one, other), label).outputs["Value"]
+    def combine(self, x: Number, y: Number, z: Number) -> Vector:
+        """Add a Combine XYZ node."""
+        node = self.node("ShaderNodeCombineXYZ")
+        for target, operand in zip(node.inputs, (x, y, z), strict=True):
+            self.feed(target, operand)
+        return Vector(self, node.outputs[0])
 
-    def length(self, vector: Value, label: str = "") -> Socket:
-        """Length of a vector."""
-        return self._vector_node("LENGTH", (vector,), label).outputs["Value"]
 
-    def vector_scale(self, vector: Value, factor: Value, label: str = "") -> Socket:
-        """Vector times float."""
-        node = self.node("ShaderNodeVectorMath", label)
-        node.operation = "SCALE"
-        self.feed(node.inputs["Vector"], vector)
-        self.feed(node.inputs["Scale"], factor)
-        return node.outputs["Vector"]
+class Value:
+    """What an output socket will hold.
 
-    def select(self, condition: Value, otherwise: Value, chosen: Value, label: str = "") -> Socket:
-        """Float `chosen` where the condition is 1, `otherwise` where it is 0; exact at both ends."""
-        return self._mix("FLOAT", (condition, otherwise, chosen), label)
+    Parameters
+    ----------
+    builder : TreeBuilder
+        Of the tree that has the socket.
+    socket : bpy.types.NodeSocket
+        An output socket.
+    """
 
-    def select_vector(self, condition: Value, otherwise: Value, chosen: Value, label: str = "") -> Socket:
-        """Vector (or color without alpha): `chosen` where the condition is 1, in proportion in between."""
-        return self._mix("VECTOR", (condition, otherwise, chosen), label)
+    __slots__ = ("builder", "socket")
 
-    def _mix(self, data_type: str, values: tuple[Value, Value, Value], label: str) -> Socket:
-        """Mix node of this type; its sockets of other types, which it has as well, stay unused."""
-        node = self.node("ShaderNodeMix", label)
-        node.data_type = data_type
-        node.factor_mode = "UNIFORM"
-        node.clamp_factor = True
-        kind = data_type.capitalize()
-        by_name = {socket.identifier: socket for socket in node.inputs}
-        for name, value in zip(("Factor_Float", f"A_{kind}", f"B_{kind}"), values, strict=True):
-            self.feed(by_name[name], value)
-        return next(socket for socket in node.outputs if socket.identifier == f"Result_{kind}")
+    def __init__(self, builder: TreeBuilder, socket: Socket) -> None:
+        self.builder = builder
+        self.socket = socket
 
-    def combine(self, x: Value, y: Value, z: Value, label: str = "") -> Socket:
-        """Vector of three floats."""
-        node = self.node("ShaderNodeCombineXYZ", label)
-        for target, value in zip(node.inputs, (x, y, z), strict=True):
-            self.feed(target, value)
-        return node.outputs[0]
+    def labeled(self, text: str) -> Self:
+        """Label the node that the value comes from."""
+        self.socket.node.label = text
+        return self
 
-    def separate(self, vector: Value, label: str = "") -> tuple[Socket, Socket, Socket]:
-        """Components of a vector."""
-        node = self.node("ShaderNodeSeparateXYZ", label)
-        self.feed(node.inputs[0], vector)
-        return node.outputs[0], node.outputs[1], node.outputs[2]
 
-    def rotate_euler(self, vector: Value, euler: Value, label: str = "") -> Socket:
-        """Vector Rotate node, XYZ Euler angles about the origin."""
-        node = self.node("ShaderNodeVectorRotate", label)
+class Float(Value):
+    """One number per pixel or ray. Constants may be written as Python's numbers."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Number) -> Float:
+        return self.builder.math("ADD", self, other)
+
+    def __radd__(self, other: float) -> Float:
+        return self.builder.math("ADD", other, self)
+
+    def __sub__(self, other: Number) -> Float:
+        return self.builder.math("SUBTRACT", self, other)
+
+    def __rsub__(self, other: float) -> Float:
+        return self.builder.math("SUBTRACT", other, self)
+
+    @overload
+    def __mul__(self, other: Number) -> Float: ...
+    @overload
+    def __mul__(self, other: Direction) -> Vector: ...
+    def __mul__(self, other: Number | Direction) -> Float | Vector:
+        if isinstance(other, Vector | tuple):
+            return Vector(self.builder, self.builder.vector_math("SCALE", other, scale=self).outputs["Vector"])
+        return self.builder.math("MULTIPLY", self, other)
+
+    def __rmul__(self, other: float) -> Float:
+        return self.builder.math("MULTIPLY", other, self)
+
+    def __truediv__(self, other: Number) -> Float:
+        return self.builder.math("DIVIDE", self, other)
+
+    def __rtruediv__(self, other: float) -> Float:
+        return self.builder.math("DIVIDE", other, self)
+
+    def __pow__(self, other: Number) -> Float:
+        return self.builder.math("POWER", self, other)
+
+    def __rpow__(self, other: float) -> Float:
+        return self.builder.math("POWER", other, self)
+
+    def __mod__(self, other: Number) -> Float:
+        """Remainder with the sign of the divisor, as Python has it."""
+        return self.builder.math("FLOORED_MODULO", self, other)
+
+    def __neg__(self) -> Float:
+        return self * -1.0
+
+    def __abs__(self) -> Float:
+        return self.builder.math("ABSOLUTE", self)
+
+    def less_than(self, other: Number) -> Float:
+        """1 where the value is less than `other`, else 0, also for NaN."""
+        return self.builder.math("LESS_THAN", self, other)
+
+    def greater_than(self, other: Number) -> Float:
+        """1 where the value is greater than `other`, else 0, also for NaN."""
+        return self.builder.math("GREATER_THAN", self, other)
+
+    def near(self, other: Number, tolerance: float) -> Float:
+        """1 where the value differs from `other` by `tolerance` at most, else 0, also for NaN."""
+        return self.builder.math("COMPARE", self, other, tolerance)
+
+
+class Vector(Value):
+    """Three numbers per pixel or ray: a vector, or a color whose alpha arithmetic leaves out."""
+
+    __slots__ = ()
+
+    def _apply(self, operation: str, *others: Operand, scale: Number | None = None) -> Vector:
+        return Vector(self.builder, self.builder.vector_math(operation, self, *others, scale=scale).outputs["Vector"])
+
+    def __add__(self, other: Direction) -> Vector:
+        return self._apply("ADD", other)
+
+    def __sub__(self, other: Direction) -> Vector:
+        return self._apply("SUBTRACT", other)
+
+    def __mul__(self, other: Number | Direction) -> Vector:
+        """Scale by a number, or multiply component by component."""
+        if isinstance(other, Float | float | int):
+            return self._apply("SCALE", scale=other)
+        return self._apply("MULTIPLY", other)
+
+    def cross(self, other: Direction) -> Vector:
+        """Cross product."""
+        return self._apply("CROSS_PRODUCT", other)
+
+    def dot(self, other: Direction) -> Float:
+        """Dot product."""
+        return Float(self.builder, self.builder.vector_math("DOT_PRODUCT", self, other).outputs["Value"])
+
+    def length(self) -> Float:
+        """Euclidean length."""
+        return Float(self.builder, self.builder.vector_math("LENGTH", self).outputs["Value"])
+
+    def normalized(self) -> Vector:
+        """The vector of length 1 in the same direction."""
+        return self._apply("NORMALIZE")
+
+    def rotated(self, euler: Vector) -> Vector:
+        """The vector rotated about the origin by XYZ Euler angles in radians."""
+        node = self.builder.node("ShaderNodeVectorRotate")
         node.rotation_type = "EULER_XYZ"
-        self.feed(node.inputs["Vector"], vector)
-        self.feed(node.inputs["Rotation"], euler)
-        return node.outputs[0]
+        self.builder.feed(node.inputs["Vector"], self)
+        self.builder.feed(node.inputs["Rotation"], euler)
+        return Vector(self.builder, node.outputs[0])
 
-    # Images
-    # ----------------------------------------------------------------------------------------------------
-
-    def separate_color(self, color: Value, label: str = "") -> tuple[Socket, Socket, Socket, Socket]:
-        """Red, green, blue and alpha as they are stored: nothing is divided by alpha."""
-        node = self.node("CompositorNodeSeparateColor", label)
-        node.mode = "RGB"
-        self.feed(node.inputs[0], color)
-        return node.outputs[0], node.outputs[1], node.outputs[2], node.outputs[3]
-
-    def combine_color(self, red: Value, green: Value, blue: Value, alpha: Value = 1.0, label: str = "") -> Socket:
-        """Color of four floats."""
-        node = self.node("CompositorNodeCombineColor", label)
-        node.mode = "RGB"
-        for target, value in zip(node.inputs, (red, green, blue, alpha), strict=True):
-            self.feed(target, value)
-        return node.outputs[0]
-
-    def image_size(self, image: Value, label: str = "") -> tuple[Socket, Socket]:
-        """Width and height of an image in pixels; 0 and 0 for a plain color or a missing file."""
-        node = self.node("CompositorNodeImageInfo", label)
-        self.feed(node.inputs[0], image)
-        width, height, _ = self.separate(node.outputs["Dimensions"])
-        return width, height
-
-    def render_area(self, label: str = "") -> Socket:
-        """A float image of zeros that has exactly the render's size, whatever is linked elsewhere.
-
-        A Box Mask without an input is the one node of both versions that takes its size from the render
-        alone. As the first operand it makes Blender bring the other operands to the render's pixels.
-        """
-        mask = self.node("CompositorNodeBoxMask", label)
-        return self.math("MULTIPLY", mask.outputs[0], 0.0)
-
-    def map_uv(self, image: Value, uv: Value, interpolation: str, label: str = "") -> Socket:
-        """Look an image up at texture coordinates; the third component of `uv` must be 1.
-
-        `interpolation` is "Nearest" (either version) or "Bilinear" (5.x only: u repeats, v ends at the
-        edges).
-        """
-        node = self.node("CompositorNodeMapUV", label)
-        if SETTINGS_ARE_SOCKETS:
-            node.inputs["Interpolation"].default_value = interpolation
-            node.inputs["Extension X"].default_value = "Repeat"
-            node.inputs["Extension Y"].default_value = "Extend"
-        else:
-            if interpolation != "Nearest":
-                raise ValueError(f"Map UV has no {interpolation} interpolation in Blender 4.5.")
-            node.filter_type = "NEAREST"
-        self.feed(node.inputs["Image"], image)
-        self.feed(node.inputs["UV"], uv)
-        return node.outputs[0]
-
-    def scale_by(self, image: Value, factor: Value, interpolation: str = "Nearest", label: str = "") -> Socket:
-        """Scale an image about its center by one factor for both axes."""
-        node = self._scale(image, interpolation, label)
-        if SETTINGS_ARE_SOCKETS:
-            node.inputs["Type"].default_value = "Relative"
-        else:
-            node.space = "RELATIVE"
-        self.feed(node.inputs["X"], factor)
-        self.feed(node.inputs["Y"], factor)
-        return node.outputs[0]
-
-    def scale_to_render(self, image: Value, interpolation: str, label: str = "") -> Socket:
-        """Stretch an image over the whole render."""
-        node = self._scale(image, interpolation, label)
-        if SETTINGS_ARE_SOCKETS:
-            node.inputs["Type"].default_value = "Render Size"
-            node.inputs["Frame Type"].default_value = "Stretch"
-        else:
-            node.space = "RENDER_SIZE"
-            node.frame_method = "STRETCH"
-        return node.outputs[0]
-
-    def _scale(self, image: Value, interpolation: str, label: str) -> bpy.types.Node:
-        node = self.node("CompositorNodeScale", label)
-        self.feed(node.inputs["Image"], image)
-        self._resampling(node, interpolation)
-        return node
-
-    def translate(self, image: Value, x: Value, y: Value, interpolation: str, label: str = "") -> Socket:
-        """Shift an image by pixels."""
-        node = self.node("CompositorNodeTranslate", label)
-        self.feed(node.inputs["Image"], image)
-        self.feed(node.inputs["X"], x)
-        self.feed(node.inputs["Y"], y)
-        self._resampling(node, interpolation)
-        return node.outputs[0]
-
-    @staticmethod
-    def _resampling(node: bpy.types.Node, interpolation: str) -> None:
-        if SETTINGS_ARE_SOCKETS:
-            node.inputs["Interpolation"].default_value = interpolation
-            node.inputs["Extension X"].default_value = "Extend"
-            node.inputs["Extension Y"].default_value = "Extend"
-        else:
-            node.interpolation = interpolation.upper()
+    def separate(self) -> tuple[Float, Float, Float]:
+        """Add a Separate XYZ node and return the components."""
+        node = self.builder.node("ShaderNodeSeparateXYZ")
+        self.builder.feed(node.inputs[0], self)
+        x, y, z = (Float(self.builder, socket) for socket in node.outputs)
+        return x, y, z

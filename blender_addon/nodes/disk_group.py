@@ -4,11 +4,10 @@
 They draw a disk from the passes that were baked along with a warp map: for the input Disk of the group "Umbra Black
 Hole", or over the picture of a camera that bends its rays. Pass 1 and so on must be Image nodes with the baked EXRs,
 Non-Color and Channel Packed like the warp map; Colors is a table, and Texture is a picture with azimuth across and
-ln(radius) down, see `disk_images`.
+ln(radius) down (see `disk_images`).
 
-A compositor works out all that is in a group, whether it is wanted or not. So there is a group for each number of
-images, and for each way to use the texture; a file has those that it needs. Inside, each image is drawn by another
-group, "Umbra Disk Image".
+The compositor evaluates all nodes of a group, needed or not. So there is one group per number of images and per way to
+use the texture; a file has those that it needs. Inside, each image is drawn by another group, "Umbra Disk Image".
 """
 
 from __future__ import annotations
@@ -19,15 +18,15 @@ import bpy
 
 from ..core.physics_api import disk_look
 from . import disk_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import GROUP_NODE_TYPE, SocketSpec, StampedGroup
+from .builder import TreeBuilder
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Disk"
 GROUP_VERSION = 2
 """Raised whenever the groups' sockets or nodes change; groups with another number are rebuilt."""
 
 VERSION_KEY = "umbra_disk_version"
-"""Of the one group that there was in version 1; those of today have the kind behind it."""
+"""Key of the single group of version 1; since version 2 the kind of the group is appended."""
 
 
 def _picture(name: str, description: str) -> SocketSpec:
@@ -126,13 +125,26 @@ _OUTPUTS = (
 
 
 def pass_names(images: int) -> tuple[str, ...]:
-    """Names of the sockets of so many passes."""
+    """Names of the sockets of this many passes."""
     return tuple(f"Pass {number}" for number in range(1, images + 1))
 
 
 @cache
-def group_of(images: int, picture: bool = False) -> StampedGroup:
-    """The group for so many images of a disk, with streaks and clumps or with a picture on it; see `ensure`."""
+def group_of(images: int, picture: bool = False) -> VersionedGroup:
+    """Return the kind of group for a number of images of the disk.
+
+    Parameters
+    ----------
+    images : int
+        Number of passes, from 1.
+    picture : bool
+        Whether the texture's colors are the disk's; otherwise it holds streaks and clumps.
+
+    Returns
+    -------
+    VersionedGroup
+        Its nodes use `image_group(picture)`; `ensure` builds both.
+    """
     kind = f"{images} Picture" if picture else f"{images}"
     names = pass_names(images)
     passes = tuple(
@@ -140,36 +152,32 @@ def group_of(images: int, picture: bool = False) -> StampedGroup:
         for number, name in enumerate(names, start=1)
     )
 
-    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
+    def build(builder: TreeBuilder, values: Values) -> Values:
         inner = image_group(picture).ensure()
-        light: Socket | None = None
-        through: Socket | None = None
+        shared = {spec.name: values[spec.name] for spec in _INPUTS}
+        so_far: Values = {LIGHT: (0.0, 0.0, 0.0), THROUGH: 1.0}
         for name in names:
             node = builder.node(GROUP_NODE_TYPE, name)
             node.node_tree = inner
-            builder.feed(node.inputs[PASS], sockets[name])
-            for spec in _INPUTS:
-                builder.feed(node.inputs[spec.name], sockets[spec.name])
-            if light is not None:
-                builder.feed(node.inputs[LIGHT], light)
-                builder.feed(node.inputs[THROUGH], through)
-            light, through = node.outputs[LIGHT], node.outputs[THROUGH]
-        given = [sockets[name] for name in names]
-        disk, image = disk_nodes.build_whole(builder, given, sockets[BEHIND], light, through)
+            for socket, value in {PASS: values[name], **shared, **so_far}.items():
+                builder.feed(node.inputs[socket], value)
+            so_far = {socket: builder.value(node.outputs[socket]) for socket in so_far}
+        passes = [values[name] for name in names]
+        disk, image = disk_nodes.build_whole(builder, passes, values[BEHIND], so_far[LIGHT], so_far[THROUGH])
         return {OUTPUT: disk, IMAGE: image}
 
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
-    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
+    return VersionedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, (*passes, _BEHIND, *_INPUTS), _OUTPUTS, build)
 
 
 @cache
-def image_group(picture: bool) -> StampedGroup:
-    """The group that draws one image of the disk."""
+def image_group(picture: bool) -> VersionedGroup:
+    """Return the kind of group that draws one image of the disk."""
     kind = "Image Picture" if picture else "Image"
 
-    def build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
-        inputs = _disk_inputs(sockets)
-        light, through = disk_nodes.build_image(builder, inputs, sockets[LIGHT], sockets[THROUGH], picture=picture)
+    def build(builder: TreeBuilder, values: Values) -> Values:
+        inputs = _disk_inputs(values)
+        light, through = disk_nodes.build_image(builder, inputs, values[LIGHT], values[THROUGH], picture=picture)
         return {LIGHT: light, THROUGH: through}
 
     inputs = (
@@ -183,17 +191,17 @@ def image_group(picture: bool) -> StampedGroup:
         SocketSpec(THROUGH, "NodeSocketFloat", "Share of what is behind that is left", in_out="OUTPUT"),
     )
     key = f"{VERSION_KEY}_{kind.lower().replace(' ', '_')}"
-    return StampedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
+    return VersionedGroup(f"{GROUP_NAME} {kind}", GROUP_VERSION, key, inputs, outputs, build)
 
 
 def ensure(images: int, picture: bool) -> bpy.types.NodeTree:
-    """The group for so many images, whole and of this version, and what is inside of it."""
+    """Return the group for a number of images, and build it and the group inside it if they are not current."""
     image_group(picture).ensure()
     return group_of(images, picture).ensure()
 
 
 def remove_unused() -> None:
-    """Remove those of the groups that nothing uses any more, and then those that were inside of them."""
+    """Remove the groups that nothing uses, then those that were used only inside them."""
     for inside in (False, True):
         for tree in list(bpy.data.node_groups):
             is_inside = any(image_group(picture).owns(tree) for picture in (False, True))
@@ -202,26 +210,26 @@ def remove_unused() -> None:
 
 
 def owns(tree: bpy.types.NodeTree | None) -> bool:
-    """Whether a node tree is one of these groups, of whatever kind and version."""
+    """Whether a node tree is one of these groups, whatever its kind and version."""
     return tree is not None and any(key.startswith(VERSION_KEY) for key in tree.keys())  # noqa: SIM118
 
 
-def _disk_inputs(sockets: dict[str, Socket]) -> disk_nodes.DiskInputs:
+def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
-        disk_pass=sockets[PASS],
-        colors=sockets[COLORS],
-        texture=sockets[TEXTURE],
-        phase=sockets[PHASE],
-        first_turn=sockets[FIRST_TURN],
-        second_turn=sockets[SECOND_TURN],
-        period=sockets[PERIOD],
-        spin=sockets[SPIN],
-        direction=sockets[DIRECTION],
-        inner=sockets[INNER],
-        outer=sockets[OUTER],
-        innermost=sockets[INNERMOST],
-        flux_factor=sockets[FLUX_FACTOR],
-        page_thorne=sockets[PAGE_THORNE],
-        beaming=sockets[BEAMING],
-        **{field: sockets[name] for field, name in LOOK_SOCKETS.items()},
+        disk_pass=values[PASS],
+        colors=values[COLORS],
+        texture=values[TEXTURE],
+        phase=values[PHASE],
+        first_turn=values[FIRST_TURN],
+        second_turn=values[SECOND_TURN],
+        period=values[PERIOD],
+        spin=values[SPIN],
+        direction=values[DIRECTION],
+        inner=values[INNER],
+        outer=values[OUTER],
+        innermost=values[INNERMOST],
+        flux_factor=values[FLUX_FACTOR],
+        page_thorne=values[PAGE_THORNE],
+        beaming=values[BEAMING],
+        **{field: values[name] for field, name in LOOK_SOCKETS.items()},
     )

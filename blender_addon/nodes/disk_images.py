@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disk's small pictures, made by numpy and packed into the file: a table of colors, and the streaks.
+"""The disk's small pictures, made with numpy and packed into the file: a table of colors, and the streaks.
 
 The table is a column of pixels, its first value at the top.
 """
@@ -7,6 +7,7 @@ The table is a column of pixels, its first value at the top.
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 import bpy
 import numpy as np
@@ -14,40 +15,43 @@ from numpy.typing import NDArray
 
 from ..core.physics_api import disk_look, disk_texture, exr
 
+FloatArray: TypeAlias = NDArray[np.float64]
+
 COLORS_NAME, TEXTURE_NAME = "Umbra Disk Colors", "Umbra Disk Streaks"
 
-COLOR_ROWS = disk_look.COLORS  # those of numpy itself, between which it interpolates too
+COLOR_ROWS = disk_look.COLORS  # as many as the numpy renderer interpolates between
 
 # Pictures are scaled down to this before their means are taken.
 MEANS_SIZE = 512
 
-# A table that files had whose node group was of version 1.
+# A table in files whose node group is of version 1.
 FORMER_PROFILE_NAME = "Umbra Disk Profile"
 
-# Values are rounded to these steps, far finer than anything to be seen: the file stays small.
+# Values are rounded to these steps, which are too fine to see, to keep the file small.
 TEXTURE_STEPS = 256
 
-# What a picture was made from, on the picture itself.
+# Custom property of a picture that says what it was made from.
 _MADE_FROM = "umbra_made_from"
 
 
 def ensure_colors() -> bpy.types.Image:
-    """The table of the colors of black bodies, evenly spaced in ln(T), as an image."""
+    """Return the table of the colors of black bodies, evenly spaced in ln(T), as an image."""
 
-    def pixels() -> NDArray:
+    def pixels() -> FloatArray:
         kelvin = np.geomspace(disk_look.COLDEST, disk_look.HOTTEST, COLOR_ROWS)
         return disk_look.seen_color(kelvin)[:, None, :]
 
     return _ensure(COLORS_NAME, f"{COLOR_ROWS}", pixels)
 
 
-def streaks() -> NDArray:
-    """The streaks and clumps that the disk has by default, shape (rows, columns, 2), 0 to 1."""
-    return np.round(disk_texture.disk_texture() * TEXTURE_STEPS) / TEXTURE_STEPS
+def streaks() -> FloatArray:
+    """Return the default streaks and clumps of the disk, shape (rows, columns, 2), 0 to 1."""
+    rounded: FloatArray = np.round(disk_texture.disk_texture() * TEXTURE_STEPS) / TEXTURE_STEPS
+    return rounded
 
 
 def ensure_texture() -> bpy.types.Image:
-    """The default streaks as an image, packed as half floats, which hold their steps exactly."""
+    """Return the default streaks as an image, packed as half floats, which represent the steps exactly."""
     image = bpy.data.images.get(TEXTURE_NAME)
     if image is not None and image.packed_file is not None:
         return image
@@ -61,14 +65,14 @@ def ensure_texture() -> bpy.types.Image:
         image.pack()
     image.name = TEXTURE_NAME
     image.colorspace_settings.name = "Non-Color"
-    # no path of this computer in a file that may be passed on
+    # A file that is passed on must not contain paths of this computer.
     image.filepath_raw = f"//{path.name}"
     for packed in image.packed_files:
         packed.filepath = image.filepath_raw
     return image
 
 
-def _ensure(name: str, made_from: str, pixels: Callable[[], NDArray]) -> bpy.types.Image:
+def _ensure(name: str, made_from: str, pixels: Callable[[], FloatArray]) -> bpy.types.Image:
     image = bpy.data.images.get(name)
     if image is not None and image.get(_MADE_FROM) == made_from and image.packed_file is not None:
         return image
@@ -87,8 +91,19 @@ def _ensure(name: str, made_from: str, pixels: Callable[[], NDArray]) -> bpy.typ
     return image
 
 
-def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
-    """Means of an image's rows, from the top, premultiplied and scene-linear, shape (rows, 4); None without pixels."""
+def mean_of_rows(image: bpy.types.Image) -> FloatArray | None:
+    """Average the rows of an image.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        Any image; it is scaled down to `MEANS_SIZE` at most first.
+
+    Returns
+    -------
+    array of shape (rows, 4), or None
+        RGBA of the rows from the top, premultiplied and scene-linear. None if the image has no pixels.
+    """
     if min(image.size) <= 0:
         return None
     small = image.copy()
@@ -99,7 +114,7 @@ def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
         pixels = pixels.reshape(small.size[1], small.size[0], -1)[::-1]
         if pixels.shape[2] == 3:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
-        if not image.is_float:  # as it lies in the file
+        if not image.is_float:  # byte images have the file's values: not linear, not premultiplied
             if image.colorspace_settings.name == "sRGB":
                 color = pixels[..., :3]
                 linear = ((color + 0.055) / 1.055) ** 2.4
@@ -111,7 +126,7 @@ def mean_of_rows(image: bpy.types.Image) -> NDArray | None:
 
 
 def remove_unused() -> None:
-    """Remove those of the pictures that nothing uses any more."""
+    """Remove the pictures that nothing uses."""
     for image in list(bpy.data.images):
         if image.name.startswith((FORMER_PROFILE_NAME, COLORS_NAME, TEXTURE_NAME)) and image.users == 0:
             bpy.data.images.remove(image)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader node group "Umbra World": its sockets, its version, and keeping it whole.
+"""The shader node group "Umbra World": its sockets and its version.
 
-Its Vector takes the place of Texture Coordinate > Generated in front of whatever makes the World's sky; its Tint
-multiplies, and its Fault is added to, the color that comes out of it. Each lensed World has a group of its own,
-because the map is read inside of it.
+Its Vector replaces Texture Coordinate > Generated as the input of the World's sky; the sky's color is multiplied by its
+Tint, and its Fault is added. Each lensed World has a group of its own, because the map is read inside the group.
 """
 
 from __future__ import annotations
@@ -11,8 +10,8 @@ from __future__ import annotations
 import bpy
 
 from . import black_hole_group, world_nodes
-from .builder import Socket, TreeBuilder
-from .stamped_group import SocketSpec, StampedGroup
+from .builder import TreeBuilder
+from .versioned_group import SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra World"
 GROUP_VERSION = 1
@@ -58,8 +57,16 @@ INPUTS = (
 OUTPUTS = (VECTOR, TINT, FAULT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
 
 
-def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket]:
-    results = world_nodes.build(builder, world_nodes.WorldInputs(*(sockets[spec.name] for spec in INPUTS)))
+def _build(builder: TreeBuilder, values: Values) -> Values:
+    inputs = world_nodes.WorldInputs(
+        lensing=values[LENSING.name],
+        other_rays=values[OTHER_RAYS.name],
+        exposure=values[black_hole_group.EXPOSURE.name],
+        redshift_color=values[black_hole_group.REDSHIFT_COLOR.name],
+        redshift_brightness=values[black_hole_group.REDSHIFT_BRIGHTNESS.name],
+        temperature=values[black_hole_group.TEMPERATURE.name],
+    )
+    results = world_nodes.build(builder, inputs)
     return {
         VECTOR.name: results.vector,
         TINT.name: results.tint,
@@ -69,7 +76,7 @@ def _build(builder: TreeBuilder, sockets: dict[str, Socket]) -> dict[str, Socket
     }
 
 
-_GROUP = StampedGroup(
+_GROUP = VersionedGroup(
     GROUP_NAME,
     GROUP_VERSION,
     VERSION_KEY,
@@ -85,10 +92,10 @@ is_current = _GROUP.is_current
 
 
 def new_group() -> bpy.types.NodeTree:
-    """A group of this kind, besides any that there are."""
+    """Add a group of this kind to the file, whether or not it has others."""
     return _GROUP.ensure(bpy.data.node_groups.new(GROUP_NAME, _GROUP.tree_type))
 
 
 def mend(tree: bpy.types.NodeTree) -> bpy.types.NodeTree:
-    """A group, rebuilt in place unless it is whole and of this version; whether it reads a map is not kept."""
+    """Return the group, rebuilt in place unless it is current; image nodes of a rebuilt group have no map."""
     return _GROUP.ensure(tree)

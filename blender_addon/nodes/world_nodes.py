@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import bpy
 
 from ..core.physics_api import reference_render, world_map
-from .black_hole_nodes import redshift_gain
-from .builder import Socket, TreeBuilder, Value
+from .arithmetic import atan2, clamp, floor, log, maximum, minimum, mix, multiply_add, sqrt, where
+from .builder import Float, Number, TreeBuilder, Vector
+from .redshift import redshift_gain
 
 MAP_ROLE = "umbra_world_map"
 """Custom property of the image nodes that read the map."""
@@ -29,41 +30,43 @@ ON = 0.5  # switches are floats, so that drivers and keyframes are at hand
 
 @dataclass(frozen=True)
 class WorldInputs:
-    """Output sockets of the Group Input node."""
+    """Values of the Group Input node; `world_group` describes them."""
 
-    lensing: Socket
-    other_rays: Socket
-    exposure: Socket
-    redshift_color: Socket
-    redshift_brightness: Socket
-    temperature: Socket
+    lensing: Float
+    other_rays: Float
+    exposure: Float
+    redshift_color: Float
+    redshift_brightness: Float
+    temperature: Float
 
 
 @dataclass(frozen=True)
 class WorldOutputs:
-    """What goes into the Group Output node."""
+    """Values for the Group Output node; `world_group` describes them."""
 
-    vector: Socket
-    tint: Socket
-    fault: Socket
-    shadow: Socket
-    redshift: Socket
+    vector: Vector
+    tint: Vector
+    fault: Vector
+    shadow: Float
+    redshift: Float
 
 
 @dataclass(frozen=True)
 class _Header:
-    outward: Socket
-    offset: Socket
-    polar: Socket
-    slope: Socket
-    motion: Socket
-    beta: Socket
-    shift: Socket
-    constant: Socket
-    lowest: Socket
-    stamp: Socket
-    width: Socket
-    height: Socket
+    """Row 0 of the map; see `physics.maps.world_map` for what the values mean."""
+
+    outward: Vector
+    offset: Float
+    polar: Vector
+    slope: Float
+    motion: Vector
+    beta: Float
+    shift: Vector
+    constant: Float
+    lowest: Float
+    stamp: Float
+    width: Float
+    height: Float
 
 
 def map_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
@@ -72,61 +75,68 @@ def map_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
 
 
 def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
-    """Add all nodes between the group's inputs and its outputs."""
+    """Add all nodes between the group's inputs and its outputs.
+
+    Parameters
+    ----------
+    builder : TreeBuilder
+        Of a shader tree in which there is only the Group Input node.
+    inputs : WorldInputs
+        That node's values.
+
+    Returns
+    -------
+    WorldOutputs
+        Values to link to the Group Output node.
+    """
     with builder.frame("Which rays are bent"):
-        camera = builder.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
-        others = builder.math("GREATER_THAN", inputs.other_rays, ON)
-        lensed = builder.math("GREATER_THAN", inputs.lensing, ON)
-        lensed = builder.math("MULTIPLY", lensed, builder.math("MAXIMUM", camera, others), label="Bent?")
+        camera = Float(builder, builder.node("ShaderNodeLightPath").outputs["Is Camera Ray"])
+        others = inputs.other_rays.greater_than(ON)
+        lensed = (inputs.lensing.greater_than(ON) * maximum(camera, others)).labeled("Bent?")
     with builder.frame("Direction of the ray"):
-        generated = builder.node("ShaderNodeTexCoord").outputs["Generated"]
-        looking = builder.vector_math("NORMALIZE", generated)
+        looking = Vector(builder, builder.node("ShaderNodeTexCoord").outputs["Generated"]).normalized()
     with builder.frame("The map's header"):
         header = _read_header(builder)
-        stamped = builder.math("COMPARE", header.stamp, world_map.STAMP, _STAMP_SLACK, label="A map?")
+        is_map = header.stamp.near(world_map.STAMP, _STAMP_SLACK).labeled("A map?")
     with builder.frame("Aberration (Eq. 5)"):
-        seen = _seen_by_fido(builder, looking, header)
+        seen = _seen_by_fido(looking, header)
     with builder.frame("Angles about the hole"):
-        aside = builder.dot(seen, header.polar)
-        up = builder.dot(seen, builder.vector_math("CROSS_PRODUCT", header.outward, header.polar))
-        ahead = builder.math("MULTIPLY", builder.dot(seen, header.outward), -1.0)
-        squares = builder.math("MULTIPLY_ADD", aside, aside, builder.math("MULTIPLY", up, up))
-        away = builder.math("ARCTAN2", builder.math("SQRT", squares), ahead, label="From the hole")
-        across = builder.math("MULTIPLY", builder.math("ARCTAN2", up, aside), 0.5 / math.pi)
-        column = builder.math("MULTIPLY_ADD", across, header.width, -0.5)
-        left = builder.math("FLOOR", column)
-        share_x = builder.math("SUBTRACT", column, left)
-        columns = [builder.math("DIVIDE", builder.math("ADD", left, shift), header.width) for shift in (0.5, 1.5)]
+        aside = seen.dot(header.polar)
+        up = seen.dot(header.outward.cross(header.polar))
+        ahead = -seen.dot(header.outward)
+        away = atan2(sqrt(multiply_add(aside, aside, up * up)), ahead).labeled("From the hole")
+        across = atan2(up, aside) * (0.5 / math.pi)
+        column = multiply_add(across, header.width, -0.5)
+        left = floor(column)
+        share_x = column - left
+        columns = [(left + shift) / header.width for shift in (0.5, 1.5)]
     with builder.frame("The shadow's edge"):
         edges = [_texel(builder, each, 0.5)[1] for each in columns]
-        delta = builder.math("SUBTRACT", away, builder.select(share_x, *edges), label="From the edge")
-        visible = builder.math("GREATER_THAN", delta, 0.0, label="Sky?")
+        delta = (away - mix(share_x, *edges)).labeled("From the edge")
+        visible = delta.greater_than(0.0).labeled("Sky?")
     with builder.frame("Where the light comes from"):
         origin = _origin(builder, header, columns, share_x, delta)
-        found = builder.math("GREATER_THAN", builder.length(origin), world_map.SHORTEST, label="Resolved?")
-        origin = builder.vector_math("NORMALIZE", origin)
-        vector = builder.select_vector(lensed, looking, origin, "Bent or plain")
+        resolved = origin.length().greater_than(world_map.SHORTEST).labeled("Resolved?")
+        vector = where(lensed, origin.normalized(), looking).labeled("Bent or plain")
     with builder.frame("Redshift"):
-        one_plus_z = builder.math("ADD", header.constant, builder.dot(looking, header.shift))
-        # what is no map must not make numbers that are none
-        one_plus_z = builder.math("MAXIMUM", reference_render.SMALLEST_ONE_PLUS_Z, one_plus_z)
-        gain = redshift_gain(builder, one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
+        one_plus_z = header.constant + looking.dot(header.shift)
+        # A picture that is not a map must not lead to NaN.
+        one_plus_z = maximum(reference_render.SMALLEST_ONE_PLUS_Z, one_plus_z)
+        gain = redshift_gain(one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
     with builder.frame("Results"):
-        shown = builder.math("MULTIPLY", visible, builder.math("MULTIPLY", stamped, found))
-        tint = builder.select_vector(shown, (0.0, 0.0, 0.0), gain)
-        tint = builder.select_vector(lensed, (1.0, 1.0, 1.0), tint)
-        tint = builder.vector_scale(tint, builder.math("POWER", 2.0, inputs.exposure))
-        # no map at all, or sky whose ray was not resolved
-        whole = builder.math("MULTIPLY", stamped, builder.select(visible, 1.0, found))
-        broken = builder.math("MULTIPLY", lensed, builder.math("SUBTRACT", 1.0, whole), label="Magenta if invalid")
-        fault = builder.vector_scale(reference_render.MAGENTA, broken)
-        shadow = builder.math("MULTIPLY", lensed, builder.math("SUBTRACT", 1.0, visible))
-        redshift = builder.select(lensed, 1.0, one_plus_z)
+        shown = visible * (is_map * resolved)
+        tint = where(lensed, where(shown, gain, (0.0, 0.0, 0.0)), (1.0, 1.0, 1.0))
+        tint = tint * 2.0**inputs.exposure
+        # Magenta without a map, and in sky whose ray was not resolved.
+        correct = is_map * where(visible, resolved, 1.0)
+        fault = (lensed * (1.0 - correct)).labeled("Magenta if invalid") * reference_render.MAGENTA
+        shadow = lensed * (1.0 - visible)
+        redshift = where(lensed, one_plus_z, 1.0)
     return WorldOutputs(vector, tint, fault, shadow, redshift)
 
 
-def _texel(builder: TreeBuilder, across: Value, height: Value) -> tuple[Socket, Socket]:
-    """Color and alpha of the texel at texture coordinates; round and round across."""
+def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector, Float]:
+    """Color and alpha of the texel at texture coordinates; `across` repeats with period 1."""
     place = builder.combine(across, height, 0.0)
     node = builder.node("ShaderNodeTexImage")
     node.interpolation = "Closest"
@@ -134,44 +144,51 @@ def _texel(builder: TreeBuilder, across: Value, height: Value) -> tuple[Socket, 
     node.extension = "REPEAT"
     node[MAP_ROLE] = True
     builder.feed(node.inputs["Vector"], place)
-    return node.outputs["Color"], node.outputs["Alpha"]
+    return Vector(builder, node.outputs["Color"]), Float(builder, node.outputs["Alpha"])
 
 
 def _read_header(builder: TreeBuilder) -> _Header:
-    parts: list[Socket] = []
-    for part in range(4):
-        parts.extend(_texel(builder, (part + 0.5) / world_map.HEADER_PARTS, _HEADER_HEIGHT))
-    last, height = _texel(builder, 4.5 / world_map.HEADER_PARTS, _HEADER_HEIGHT)
-    lowest, stamp, width = builder.separate(last)
-    return _Header(*parts, lowest, stamp, builder.math("MAXIMUM", 1.0, width), builder.math("MAXIMUM", 1.0, height))
+    (outward, offset), (polar, slope), (motion, beta), (shift, constant), (last, height) = (
+        _texel(builder, (part + 0.5) / world_map.HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
+    )
+    lowest, stamp, width = last.separate()
+    return _Header(
+        outward=outward,
+        offset=offset,
+        polar=polar,
+        slope=slope,
+        motion=motion,
+        beta=beta,
+        shift=shift,
+        constant=constant,
+        lowest=lowest,
+        stamp=stamp,
+        width=maximum(1.0, width),
+        height=maximum(1.0, height),
+    )
 
 
-def _seen_by_fido(builder: TreeBuilder, looking: Socket, header: _Header) -> Socket:
+def _seen_by_fido(looking: Vector, header: _Header) -> Vector:
     """Where the local FIDO looks to see what the camera sees; not of unit length."""
-    less, more = builder.math("SUBTRACT", 1.0, header.beta), builder.math("ADD", 1.0, header.beta)
-    contraction = builder.math("SQRT", builder.math("MAXIMUM", 0.0, builder.math("MULTIPLY", less, more)))
-    along = builder.dot(looking, header.motion)
-    factor = builder.math("MULTIPLY", builder.math("SUBTRACT", 1.0, contraction), along)
-    factor = builder.math("SUBTRACT", factor, header.beta)
-    contracted = builder.vector_scale(looking, contraction)
-    return builder.vector_math("ADD", contracted, builder.vector_scale(header.motion, factor))
+    contraction = sqrt(maximum(0.0, (1.0 - header.beta) * (1.0 + header.beta)))
+    along = looking.dot(header.motion)
+    factor = (1.0 - contraction) * along - header.beta
+    return looking * contraction + header.motion * factor
 
 
-def _origin(builder: TreeBuilder, header: _Header, columns: list[Socket], share_x: Socket, delta: Socket) -> Socket:
+def _origin(builder: TreeBuilder, header: _Header, columns: list[Float], share_x: Float, delta: Float) -> Vector:
     """The vector towards the light's origin, mixed of four texels; shorter than 1."""
-    positive = builder.math("MAXIMUM", delta, _LEAST_DISTANCE)
-    place = builder.math("ADD", builder.math("LOGARITHM", positive, math.e), positive)
-    height = builder.math("MULTIPLY_ADD", place, header.slope, header.offset)
-    highest = builder.math("SUBTRACT", 1.0, builder.math("DIVIDE", 0.5, header.height))
-    height = builder.math("MINIMUM", highest, builder.math("MAXIMUM", header.lowest, height))
-    row = builder.math("MULTIPLY_ADD", height, header.height, -0.5)
-    below = builder.math("FLOOR", row)
-    share_y = builder.math("SUBTRACT", row, below)
-    last = builder.math("SUBTRACT", header.height, 0.5)
+    positive = maximum(delta, _LEAST_DISTANCE)
+    height = multiply_add(log(positive) + positive, header.slope, header.offset)
+    highest = 1.0 - 0.5 / header.height
+    height = clamp(height, header.lowest, highest)
+    row = multiply_add(height, header.height, -0.5)
+    below = floor(row)
+    share_y = row - below
+    last = header.height - 0.5
     mixed = []
     for shift in (0.5, 1.5):
-        at = builder.math("MINIMUM", last, builder.math("ADD", below, shift))
-        at = builder.math("DIVIDE", at, header.height)
+        at = minimum(last, below + shift) / header.height
         texels = [_texel(builder, column, at)[0] for column in columns]
-        mixed.append(builder.select_vector(share_x, *texels))
-    return builder.select_vector(share_y, *mixed)
+        mixed.append(mix(share_x, *texels))
+    return mix(share_y, *mixed)

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node groups that code builds, stamped with a version, and rebuilt wherever they are not what they should be."""
+"""Node groups built by code. Each has a version, and is rebuilt when it differs from what the code builds."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import bpy
 
-from .builder import SETTINGS_ARE_SOCKETS, Socket, TreeBuilder
+from .builder import TreeBuilder
+from .image_nodes import SETTINGS_ARE_SOCKETS
 
 BLENDER_KEY = "umbra_built_with_blender"
 CONTENT_KEY = "umbra_content"
+
+Values: TypeAlias = dict[str, Any]
+"""Name of a socket -> its `Float` or `Vector`."""
 
 TREE_TYPE = "CompositorNodeTree"
 GROUP_NODE_TYPE = "CompositorNodeGroup"
@@ -20,24 +25,28 @@ GROUP_NODE_TYPE = "CompositorNodeGroup"
 
 @dataclass(frozen=True)
 class SocketSpec:
-    """A socket of the group as the artist sees it."""
+    """A socket of a group as the artist sees it: its name, tooltip, default, range and unit."""
 
     name: str
     socket_type: str
+    """"NodeSocketFloat", "NodeSocketVector" or "NodeSocketColor"."""
     description: str
     in_out: str = "INPUT"
+    """"INPUT" or "OUTPUT"."""
     default: float | tuple[float, ...] | None = None
     minimum: float | None = None
     maximum: float | None = None
     subtype: str = "NONE"
+    """Blender's unit or widget, such as "FACTOR"; colors have none."""
     hide_value: bool = False
 
 
 @dataclass(frozen=True)
-class StampedGroup:
-    """A kind of node group, of which a file has one unless `ensure` is told which is meant.
+class VersionedGroup:
+    """A kind of node group: its sockets, and the function that adds its nodes.
 
-    `is_current` and `ensure` look into the group itself, so that a change by hand is found as well.
+    A file has one group of the kind, unless `ensure` is given another. `is_current` and `ensure` compare the nodes
+    themselves, so that changes by hand are found as well.
     """
 
     name: str
@@ -47,39 +56,43 @@ class StampedGroup:
     """The group's custom property that holds its version, and tells it from other groups."""
     inputs: tuple[SocketSpec, ...]
     outputs: tuple[SocketSpec, ...]
-    build: Callable[[TreeBuilder, dict[str, Socket]], dict[str, Socket]]
-    """Adds all nodes between the group's inputs and outputs, both by name."""
+    build: Callable[[TreeBuilder, Values], Values]
+    """Adds all nodes between the group's inputs and its outputs, given and returned by socket name."""
     former_names: dict[tuple[str, str], str] = field(default_factory=dict)
     """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
     tree_type: str = TREE_TYPE
     node_type: str = GROUP_NODE_TYPE
 
     def owns(self, tree: bpy.types.NodeTree | None) -> bool:
-        """Whether a node tree is this group, of whatever version, whole or damaged."""
+        """Whether a node tree is of this kind, whatever its version and state."""
         return tree is not None and tree.bl_idname == self.tree_type and self.version_key in tree
 
     def is_current(self, tree: bpy.types.NodeTree) -> bool:
         """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
-        return (
+        return bool(
             tree.get(self.version_key) == self.version
             and tree.get(BLENDER_KEY) == _blender_series()
             and tree.get(CONTENT_KEY) == _fingerprint(tree)
         )
 
     def find(self) -> bpy.types.NodeTree | None:
-        """The group in this file, or None. One linked from another file is left out: it cannot be repaired."""
+        """The group in this file, or None. Groups linked from other files do not count: they cannot be rebuilt."""
         groups = [tree for tree in bpy.data.node_groups if self.owns(tree) and tree.library is None]
         return next((tree for tree in groups if tree.name == self.name), groups[0] if groups else None)
 
     def ensure(self, tree: bpy.types.NodeTree | None = None) -> bpy.types.NodeTree:
-        """The group, or the one that is given, whole and of this version.
+        """Return the group, and build or rebuild it if it is not current.
+
+        Parameters
+        ----------
+        tree : bpy.types.NodeTree, optional
+            A group of this kind, or an empty tree that becomes one. By default the file's group.
 
         Returns
         -------
         bpy.types.NodeTree
-            Built anew if the file has none. One of another version, from another version of Blender, or with
-            changes inside is rebuilt in place: group nodes that use it keep their values and links, as far as
-            their sockets still exist.
+            The given group, the one found, or a new one. Rebuilding is done in place: nodes that use the group keep
+            their values and links to sockets that still exist.
         """
         tree = tree or self.find()
         if tree is None:
@@ -89,7 +102,7 @@ class StampedGroup:
         return tree
 
     def add_node(self, tree: bpy.types.NodeTree) -> bpy.types.Node:
-        """Add a group node that uses the group to a tree; `inputs` and `outputs` name its sockets."""
+        """Add a group node that uses the group to a tree."""
         node = tree.nodes.new(self.node_type)
         node.node_tree = self.ensure()
         node.name = node.label = self.name
@@ -101,21 +114,19 @@ class StampedGroup:
         for spec in self._match_interface(tree):
             _set_default_in_users(tree, spec)
         builder = TreeBuilder(tree)
-        group_input = builder.node("NodeGroupInput")
-        sockets = {socket.name: socket for socket in group_input.outputs}
-        results = self.build(builder, {spec.name: sockets[spec.name] for spec in self.inputs})
-        group_output = builder.node("NodeGroupOutput")
-        targets = {socket.name: socket for socket in group_output.inputs}
+        sockets = {socket.name: socket for socket in builder.node("NodeGroupInput").outputs}
+        results = self.build(builder, {spec.name: builder.value(sockets[spec.name]) for spec in self.inputs})
+        targets = {socket.name: socket for socket in builder.node("NodeGroupOutput").inputs}
         for spec in self.outputs:
-            tree.links.new(results[spec.name], targets[spec.name])
+            builder.feed(targets[spec.name], results[spec.name])
         tree[self.version_key] = self.version
         tree[BLENDER_KEY] = _blender_series()
         tree[CONTENT_KEY] = _fingerprint(tree)
 
     def _match_interface(self, tree: bpy.types.NodeTree) -> list[SocketSpec]:
-        """Make the sockets what they should be, keeping those that exist: values and links hang on them.
+        """Make the sockets match their specifications, and return the inputs that did not exist before.
 
-        Returns the inputs that did not exist before.
+        Sockets that exist are kept, because the values and links of group nodes belong to them.
         """
         interface = tree.interface
         wanted = {(spec.in_out, spec.name): spec for spec in (*self.outputs, *self.inputs)}
@@ -140,12 +151,12 @@ class StampedGroup:
 
 
 def _blender_series() -> str:
-    """Nodes are written differently by each series, and Blender converts old files upward only."""
+    """Version up to the minor number: each stores nodes differently, and Blender converts old files upward only."""
     return f"{bpy.app.version[0]}.{bpy.app.version[1]}"
 
 
 def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
-    """Give a new input its default in existing group nodes, where Blender made it before it had one."""
+    """Give a new input its default in existing group nodes; Blender added it to them before it had one."""
     users = [*bpy.data.node_groups, *(world.node_tree for world in bpy.data.worlds if world.node_tree is not None)]
     if not SETTINGS_ARE_SOCKETS:
         users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
@@ -170,7 +181,7 @@ def _describe(item: bpy.types.NodeTreeInterfaceSocket, spec: SocketSpec) -> None
 
 
 def _fingerprint(tree: bpy.types.NodeTree) -> str:
-    """Hash of all that decides what the group does; the places and names of nodes are left out."""
+    """Hash of all that determines a group's result; positions and names of nodes do not count."""
     order = {node: index for index, node in enumerate(tree.nodes)}
     lines = [_interface_line(item) for item in tree.interface.items_tree]
     for node, index in order.items():
@@ -192,7 +203,7 @@ def _fingerprint(tree: bpy.types.NodeTree) -> str:
 
 def _interface_line(item: bpy.types.NodeTreeInterfaceItem) -> str:
     if item.item_type != "SOCKET":
-        return item.item_type
+        return str(item.item_type)
     details = [getattr(item, name, "") for name in ("description", "subtype", "min_value", "max_value", "hide_value")]
     return f"{item.in_out} {item.name} {item.identifier} {item.socket_type} {details}"
 
