@@ -5,17 +5,17 @@ import os
 
 import bpy
 
-from ..core.physics_api import map_check
+from ..core.physics_api import physics
 from .folder import folder
 from .request import PASS_FORMAT, SEQUENCE_LENGTH, MapRequest, kind_of, name_pattern, older_maps
 
-State = map_check.State
+State = physics.MapState
 
 # What a bake would replace.
 FAULTY = (State.STALE, State.FOREIGN, State.DAMAGED)
 
 
-def check(wanted: MapRequest, *, thorough: bool = True) -> map_check.Finding:
+def check(wanted: MapRequest, *, thorough: bool = True) -> physics.MapFinding:
     """Return what a map is, with its disk's passes: the first thing that is wrong with any of the files.
 
     Parameters
@@ -26,13 +26,13 @@ def check(wanted: MapRequest, *, thorough: bool = True) -> map_check.Finding:
         Read and check the pixels too, 0.1 s in full HD; otherwise headers are trusted.
     """
     kind = wanted.kind
-    found = map_check.check_map(wanted.path, kind.format, wanted.parameters.hash, thorough=thorough)
+    found = physics.check_map(wanted.path, kind.format, wanted.parameters.hash, thorough=thorough)
     if found.state is State.MISSING and older_maps(wanted):
-        return map_check.Finding(State.STALE, f"The {kind.noun} {wanted.path} is out of date")
+        return physics.MapFinding(State.STALE, f"The {kind.noun} {wanted.path} is out of date")
     for one in wanted.passes:
         if found.state is not State.VALID:
             break
-        found = map_check.check_map(one, PASS_FORMAT, wanted.parameters.hash, thorough=thorough)
+        found = physics.check_map(one, PASS_FORMAT, wanted.parameters.hash, thorough=thorough)
     return found
 
 

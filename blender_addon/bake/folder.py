@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import MapFolderError
-from ..core.physics_api import exr
+from ..core.physics_api import physics
 
 BYTES_PER_PIXEL = 32  # eight float32, before compression: an upper bound for the size of a map of any kind
 
@@ -82,7 +82,7 @@ def half_files(directory: Path) -> dict[str, list[Path]]:
     except OSError:
         return found
     for name in names:
-        target = exr.target_of(name)
+        target = physics.temporary_target(name)
         if target is None and name.startswith(".") and name.endswith(_PART):
             target = name.removeprefix(".").removesuffix(_PART)
         if target is not None:

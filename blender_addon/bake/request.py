@@ -16,16 +16,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import SceneError
-from ..core.physics_api import (
-    disk_pass_file,
-    exit_map,
-    exit_map_file,
-    map_file,
-    physics,
-    warp_map_file,
-    world_map,
-    world_map_file,
-)
+from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..scene.frame_setup import FrameSetup
 from .folder import MapFolder, folder
@@ -55,7 +46,7 @@ class MapKind:
     """What a file is read as, and how it is made."""
 
     noun: str
-    format: "map_file.MapFormat"
+    format: "physics.MapFormat"
     steps: Callable[..., Generator[float, None, Any]]
     """Bakes a map: yields the fraction done, returns the map."""
     write: Callable[[Path, Any], None]
@@ -82,16 +73,16 @@ def _write_warp_map(path: Path, warp_map: "physics.WarpMap") -> None:
     physics.write_warp_map(path, warp_map)
 
 
-WARP_MAP = MapKind("warp map", warp_map_file.FORMAT, _warp_map_steps, _write_warp_map, has_passes=True)
+WARP_MAP = MapKind("warp map", physics.WARP_MAP_FORMAT, _warp_map_steps, _write_warp_map, has_passes=True)
 EXIT_MAP = MapKind(
-    "exit map", exit_map_file.FORMAT, exit_map.bake_exit_map_steps, exit_map_file.write_exit_map, is_hashed=True
+    "exit map", physics.EXIT_MAP_FORMAT, physics.bake_exit_map_steps, physics.write_exit_map, is_hashed=True
 )
 WORLD_MAP = MapKind(
-    "world map", world_map_file.FORMAT, world_map.world_map_steps, world_map_file.write_world_map, mark="world_"
+    "world map", physics.WORLD_MAP_FORMAT, physics.bake_world_map_steps, physics.write_world_map, mark="world_"
 )
 KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP]
 
-PASS_FORMAT = disk_pass_file.FORMAT
+PASS_FORMAT = physics.DISK_PASS_FORMAT
 
 
 @dataclass(frozen=True)

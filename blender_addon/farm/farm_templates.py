@@ -13,7 +13,7 @@ import bpy
 
 from ..bake.folder import folder
 from ..core.errors import SceneError
-from ..core.physics_api import exr
+from ..core.physics_api import physics
 from . import farm_copy
 
 SOURCES = Path(__file__).parent
@@ -87,7 +87,7 @@ def save(scene: bpy.types.Scene, folder: Path) -> list[Path]:
         SCRIPT: script(),
     }
     for name, text in texts.items():
-        with exr.replacing(folder / name) as temporary:
+        with physics.replacing_file(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return [folder / name for name in texts]
 

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.physics_api import color
+from ..core.physics_api import physics
 from . import black_hole_nodes
 from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
@@ -107,7 +107,7 @@ TEMPERATURE = SocketSpec(
     "Sky Temperature",
     "NodeSocketFloat",
     "Color temperature of the sky's light (kelvin) from which the shift of its color is computed",
-    default=color.DEFAULT_TEMPERATURE,
+    default=physics.DEFAULT_SKY_TEMPERATURE,
     minimum=1000.0,
     maximum=40000.0,
     subtype="COLOR_TEMPERATURE",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.physics_api import reference_render
+from ..core.physics_api import physics
 from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_integer, sin, sqrt, where
 from .builder import Float, TreeBuilder, Vector
 from .image_lookup import sample_bilinearly
@@ -97,7 +97,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
     with builder.frame("Sky"):
         factor = 2.0**inputs.exposure * inputs.strength * channels.visibility
         sky = environment * gain * factor
-        sky = where(channels.valid, sky, reference_render.MAGENTA).labeled("Magenta if invalid")
+        sky = where(channels.valid, sky, physics.INVALID_MAP_COLOR).labeled("Magenta if invalid")
         data = combine(channels.visibility, channels.one_plus_z, channels.valid)
     with builder.frame("To the render's size"):
         sky, data = to_render_size(builder, sky, data)
@@ -107,9 +107,9 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
 
 def _read_map(warp_map: Vector) -> _MapChannels:
     """Tell pixels that a valid map can hold from others, and replace the others by harmless values."""
-    slack = reference_render.ANGLE_SLACK
-    smallest = reference_render.SMALLEST_ONE_PLUS_Z
-    largest = reference_render.LARGEST_ONE_PLUS_Z
+    slack = physics.ANGLE_SLACK
+    smallest = physics.SMALLEST_ONE_PLUS_Z
+    largest = physics.LARGEST_ONE_PLUS_Z
     theta, phi, one_plus_z, visibility = separate_color(warp_map)
     # Every comparison is false for NaN, so NaN makes a pixel invalid.
     conditions = (
@@ -178,7 +178,7 @@ def _compose(inputs: GroupInputs, sky: Vector, data: Vector) -> GroupOutputs:
     _, _, _, alpha = separate_color(inputs.render)
     image = multiply_add(sky, 1.0 - alpha, inputs.render)
     return GroupOutputs(
-        image=where(valid, image, reference_render.MAGENTA).labeled("Magenta if invalid"),
+        image=where(valid, image, physics.INVALID_MAP_COLOR).labeled("Magenta if invalid"),
         sky=sky,
         shadow=(1.0 - visibility).labeled("Shadow"),
         redshift=one_plus_z,

@@ -16,7 +16,7 @@ from functools import cache
 
 import bpy
 
-from ..core.physics_api import disk_look
+from ..core.physics_api import physics
 from . import disk_nodes
 from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
@@ -45,7 +45,7 @@ BEHIND, COLORS, TEXTURE = "Behind", "Colors", "Texture"
 OUTPUT, IMAGE = "Disk", "Image"
 PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
 
-_LOOK = disk_look.DiskLook()
+_LOOK = physics.DiskLook()
 
 LOOK_SOCKETS = {
     "temperature": "Temperature",
@@ -93,8 +93,8 @@ _INPUTS = (
         "NodeSocketFloat",
         "Temperature where the disk is brightest (kelvin)",
         default=_LOOK.temperature,
-        minimum=disk_look.COLDEST,
-        maximum=disk_look.HOTTEST,
+        minimum=physics.COLDEST_DISK,
+        maximum=physics.HOTTEST_DISK,
         subtype="COLOR_TEMPERATURE",
     ),
     _factor(LOOK_SOCKETS["doppler_color"], "How much the disk's motion changes its color", _LOOK.doppler_color),

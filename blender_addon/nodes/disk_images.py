@@ -13,13 +13,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.physics_api import disk_look, disk_texture, exr
+from ..core.physics_api import physics
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
 COLORS_NAME, TEXTURE_NAME = "Umbra Disk Colors", "Umbra Disk Streaks"
 
-COLOR_ROWS = disk_look.COLORS  # as many as the numpy renderer interpolates between
+COLOR_ROWS = physics.DISK_COLOR_COUNT  # as many as the numpy renderer interpolates between
 
 # Pictures are scaled down to this before their means are taken.
 MEANS_SIZE = 512
@@ -38,15 +38,15 @@ def ensure_colors() -> bpy.types.Image:
     """Return the table of the colors of black bodies, evenly spaced in ln(T), as an image."""
 
     def pixels() -> FloatArray:
-        kelvin = np.geomspace(disk_look.COLDEST, disk_look.HOTTEST, COLOR_ROWS)
-        return disk_look.seen_color(kelvin)[:, None, :]
+        kelvin = np.geomspace(physics.COLDEST_DISK, physics.HOTTEST_DISK, COLOR_ROWS)
+        return physics.disk_color(kelvin)[:, None, :]
 
     return _ensure(COLORS_NAME, f"{COLOR_ROWS}", pixels)
 
 
 def streaks() -> FloatArray:
     """Return the default streaks and clumps of the disk, shape (rows, columns, 2), 0 to 1."""
-    rounded: FloatArray = np.round(disk_texture.disk_texture() * TEXTURE_STEPS) / TEXTURE_STEPS
+    rounded: FloatArray = np.round(physics.disk_texture() * TEXTURE_STEPS) / TEXTURE_STEPS
     return rounded
 
 
@@ -60,7 +60,7 @@ def ensure_texture() -> bpy.types.Image:
     pixels[..., :2] = values
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "umbra_disk_streaks.exr")
-        exr.write_exr(path, pixels)
+        physics.write_exr(path, pixels)
         image = bpy.data.images.load(str(path))
         image.pack()
     image.name = TEXTURE_NAME

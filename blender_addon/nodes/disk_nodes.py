@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
-from ..core.physics_api import disk_look, reference_render
+from ..core.physics_api import physics
 from .arithmetic import acos, clamp, combine, cos, fraction, log, maximum, minimum, multiply_add, sin, sqrt, where
 from .builder import Float, TreeBuilder, Vector
 from .image_lookup import sample_bilinearly, sample_with_alpha
@@ -24,7 +24,7 @@ from .render_size import to_render_size
 _SMALLEST_FLUX = 1e-6
 _SMALLEST_SOFTNESS = 1e-3
 
-_LOWEST, _HIGHEST = math.log(disk_look.COLDEST), math.log(disk_look.HOTTEST)
+_LOWEST, _HIGHEST = math.log(physics.COLDEST_DISK), math.log(physics.HOTTEST_DISK)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def build_image(
         else:
             streaks, clumps = _moving_texture(inputs, shared, place, coverage)
             density = _density(inputs, place.depth, streaks, clumps)
-            full = minimum(1.0, density * disk_look.OPACITY_REACH)
+            full = minimum(1.0, density * physics.DISK_OPACITY_REACH)
     with builder.frame("Light"):
         if picture:
             color = _tinted_light(inputs, shared, radius, g, tint)
@@ -190,7 +190,7 @@ def build_whole(
         covered = 1.0 - through
         light, alphas = to_render_size(builder, light, combine(covered, covered, covered))
     with builder.frame("Picture"):
-        light = where(complete, light, reference_render.MAGENTA).labeled("Magenta if a pass is missing")
+        light = where(complete, light, physics.INVALID_MAP_COLOR).labeled("Magenta if a pass is missing")
         red, green, blue = light.separate()
         alpha = where(complete, alphas.separate()[0], 1.0)
         disk = combine_color(red, green, blue, alpha)
@@ -287,7 +287,7 @@ def _moving_picture(inputs: DiskInputs, shared: _Shared, place: _Place) -> tuple
         color, alpha = sample_with_alpha(inputs.texture, u, v)
         samples.append((color * pattern.share, alpha * pattern.share))
     color, alpha = (one + other for one, other in zip(*samples, strict=True))
-    inverse = 1.0 / maximum(disk_look.SMALLEST_ALPHA, alpha)
+    inverse = 1.0 / maximum(physics.SMALLEST_ALPHA, alpha)
     return color * inverse, clamp(alpha, 0.0, 1.0)
 
 
@@ -325,11 +325,11 @@ def _density(inputs: DiskInputs, depth: Float, streaks: Float, clumps: Float) ->
 def _emission(inputs: DiskInputs, shared: _Shared, radius: Float, g: Float) -> Vector:
     """Light of an opaque disk where it is densest; see `physics.light.disk_look.emission`."""
     flux = _flux(inputs, shared.flux, radius)
-    shift = maximum(disk_look.SMALLEST_G, g)
+    shift = maximum(physics.SMALLEST_G, g)
     cooling = maximum(_SMALLEST_FLUX, flux) ** shared.temperature_power
     seen = shift**inputs.doppler_color
     temperature = inputs.temperature * cooling * seen
-    temperature = clamp(temperature, disk_look.COLDEST, disk_look.HOTTEST)
+    temperature = clamp(temperature, physics.COLDEST_DISK, physics.HOTTEST_DISK)
     place = (log(temperature) - _LOWEST) * (1.0 / (_HIGHEST - _LOWEST))
     color = _look_up(inputs.colors, shared.color_rows, place)
     return color * _brightness(inputs, shared, flux, shift)
@@ -338,7 +338,7 @@ def _emission(inputs: DiskInputs, shared: _Shared, radius: Float, g: Float) -> V
 def _tinted_light(inputs: DiskInputs, shared: _Shared, radius: Float, g: Float, color: Vector) -> Vector:
     """Light of a place that has a color of its own; see `physics.light.disk_look.tinted_light`."""
     flux = _flux(inputs, shared.flux, radius)
-    shift = maximum(disk_look.SMALLEST_G, g)
+    shift = maximum(physics.SMALLEST_G, g)
     gain = redshift_gain(1.0 / shift, inputs.doppler_color, 0.0, inputs.temperature)
     return color * _brightness(inputs, shared, flux, shift) * gain
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..core.physics_api import color
+from ..core.physics_api import physics
 from .arithmetic import combine, exp, log, maximum, multiply_add, tanh
 from .builder import Float, Number, Vector
 
@@ -35,8 +35,8 @@ def redshift_gain(one_plus_z: Float, amount: Float, brightness_amount: Number, t
     power = 4.0 * excess * log(one_plus_z)
     temperature = maximum(1.0, temperature)
     gains = []
-    for wavelength in color.CHANNEL_WAVELENGTHS:
-        x = color.SECOND_RADIATION_CONSTANT / wavelength / temperature
+    for wavelength in physics.CHANNEL_WAVELENGTHS:
+        x = physics.SECOND_RADIATION_CONSTANT / wavelength / temperature
         y = x * one_plus_z
         ratio = _log_of_planck_term(x) - _log_of_planck_term(y)
         ratio = x - y + ratio

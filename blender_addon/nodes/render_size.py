@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from itertools import product
 
-from ..core.physics_api import reference_render
+from ..core.physics_api import physics
 from .arithmetic import multiply_add, where
 from .builder import Float, TreeBuilder, Vector
 from .image_nodes import SETTINGS_ARE_SOCKETS, image_size, render_area, scale_by, scale_to_render, translate
@@ -37,7 +37,7 @@ def to_render_size(builder: TreeBuilder, *images: Vector) -> tuple[Vector, ...]:
     area_width, area_height = image_size(area)
     for _ in range(_HALVINGS):
         width, _height = image_size(images[-1])
-        halve = (width / area_width).greater_than(reference_render.HALVE_ABOVE).labeled("Halve?")
+        halve = (width / area_width).greater_than(physics.RESIZE_HALVE_ABOVE).labeled("Halve?")
         factor = multiply_add(halve, -0.5, 1.0)
         step = halve * 0.5
         shifts = tuple(product((-step, step), repeat=2))

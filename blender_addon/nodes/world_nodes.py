@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..core.physics_api import reference_render, world_map
+from ..core.physics_api import physics
 from .arithmetic import atan2, clamp, floor, log, maximum, minimum, mix, multiply_add, sqrt, where
 from .builder import Float, Number, TreeBuilder, Vector
 from .redshift import redshift_gain
@@ -97,7 +97,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         looking = Vector(builder, builder.node("ShaderNodeTexCoord").outputs["Generated"]).normalized()
     with builder.frame("The map's header"):
         header = _read_header(builder)
-        is_map = header.stamp.near(world_map.STAMP, _STAMP_SLACK).labeled("A map?")
+        is_map = header.stamp.near(physics.WORLD_MAP_STAMP, _STAMP_SLACK).labeled("A map?")
     with builder.frame("Aberration (Eq. 5)"):
         seen = _seen_by_fido(looking, header)
     with builder.frame("Angles about the hole"):
@@ -116,12 +116,12 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         visible = delta.greater_than(0.0).labeled("Sky?")
     with builder.frame("Where the light comes from"):
         origin = _origin(builder, header, columns, share_x, delta)
-        resolved = origin.length().greater_than(world_map.SHORTEST).labeled("Resolved?")
+        resolved = origin.length().greater_than(physics.WORLD_MAP_SHORTEST).labeled("Resolved?")
         vector = where(lensed, origin.normalized(), looking).labeled("Bent or plain")
     with builder.frame("Redshift"):
         one_plus_z = header.constant + looking.dot(header.shift)
         # A picture that is not a map must not lead to NaN.
-        one_plus_z = maximum(reference_render.SMALLEST_ONE_PLUS_Z, one_plus_z)
+        one_plus_z = maximum(physics.SMALLEST_ONE_PLUS_Z, one_plus_z)
         gain = redshift_gain(one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
     with builder.frame("Results"):
         shown = visible * (is_map * resolved)
@@ -129,7 +129,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         tint = tint * 2.0**inputs.exposure
         # Magenta without a map, and in sky whose ray was not resolved.
         correct = is_map * where(visible, resolved, 1.0)
-        fault = (lensed * (1.0 - correct)).labeled("Magenta if invalid") * reference_render.MAGENTA
+        fault = (lensed * (1.0 - correct)).labeled("Magenta if invalid") * physics.INVALID_MAP_COLOR
         shadow = lensed * (1.0 - visible)
         redshift = where(lensed, one_plus_z, 1.0)
     return WorldOutputs(vector, tint, fault, shadow, redshift)
@@ -149,7 +149,7 @@ def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector
 
 def _read_header(builder: TreeBuilder) -> _Header:
     (outward, offset), (polar, slope), (motion, beta), (shift, constant), (last, height) = (
-        _texel(builder, (part + 0.5) / world_map.HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
+        _texel(builder, (part + 0.5) / physics.WORLD_MAP_HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
     )
     lowest, stamp, width = last.separate()
     return _Header(

@@ -10,7 +10,7 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ..core.physics_api import physics, reference_render
+from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import registry
 from ..scene import environment
@@ -24,7 +24,7 @@ SKY_ROWS = 256
 SQUARES = 18
 GRAYS = (0.02, 0.12)
 
-# Arguments of `reference_render.render`, and the groups' sockets that say the same.
+# Arguments of `physics.render_reference`, and the groups' sockets that say the same.
 _SOCKETS = {
     "exposure": "Exposure",
     "color_amount": "Redshift Color",
@@ -114,7 +114,7 @@ def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float,
     scene = scene_of(uid)
     if scene is None:
         return None
-    picture = reference_render.render(warp_map, _sky_of(scene), **look(scene)).sky
+    picture = physics.render_reference(warp_map, _sky_of(scene), **look(scene)).sky
     picture[..., :3] = _encoded(picture[..., :3])
     return picture[::-1]
 
@@ -127,7 +127,7 @@ def _encoded(values: np.ndarray) -> np.ndarray:
 
 
 def look(scene: bpy.types.Scene) -> dict[str, Any]:
-    """How the sky is placed and shifted, as `reference_render.render` takes it; as it is where that cannot be read."""
+    """How the sky is placed and shifted, as `physics.render_reference` takes it; as it is where that cannot be read."""
     settings = scene.umbra
     values: dict[str, Any] = {
         "color_amount": settings.redshift_color,

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.physics_api import disk_look, disk_texture, metric, physics
+from ..core.physics_api import physics
 from ..settings.disk_properties import BEAMINGS, LOOK_FIELDS
 
 SPIN, INNER, OUTER = "umbra.spin", "umbra.disk.inner_radius", "umbra.disk.outer_radius"
@@ -73,14 +73,14 @@ def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]
     return value_at(hole, SPIN, frame), disk
 
 
-def look_at(hole: bpy.types.Object, frame: float) -> "disk_look.DiskLook":
+def look_at(hole: bpy.types.Object, frame: float) -> "physics.DiskLook":
     """How the hole's disk looks at a frame."""
     settings = hole.umbra.disk
     values: dict[str, Any] = {
         name: settings.profile if name == "profile" else value_at(hole, f"umbra.disk.{name}", frame)
         for name in LOOK_FIELDS
     }
-    return disk_look.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+    return physics.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
 
 
 def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
@@ -92,7 +92,7 @@ def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
     curves = keyframes(hole)
     if not curves.keys() & {SPIN, INNER, OUTER}:
         spin, disk = disk_at(hole, scene.frame_current)
-        return disk_texture.pattern_period(spin, *disk.radii(spin), disk.retrograde)
+        return physics.disk_pattern_period(spin, *disk.radii(spin), disk.retrograde)
     periods = []
     done = set()
     for frame in range(scene.frame_start, scene.frame_end + 1):
@@ -101,6 +101,6 @@ def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
         if (spin, radii) in done:
             continue
         done.add((spin, radii))
-        if metric.horizon_radius(spin) < radii[0] < radii[1]:  # frames without a disk are refused when they come
-            periods.append(disk_texture.pattern_period(spin, *radii, disk.retrograde))
+        if physics.horizon_radius(spin) < radii[0] < radii[1]:  # frames without a disk are refused when they come
+            periods.append(physics.disk_pattern_period(spin, *radii, disk.retrograde))
     return min(periods, default=1.0)

@@ -12,7 +12,7 @@ from mathutils import Euler
 
 from ..core.blender_version import NODES_ARE_OPTIONAL
 from ..core.errors import SceneError
-from ..core.physics_api import PACKAGE, exr, star_sky
+from ..core.physics_api import PACKAGE, physics
 
 # On a scene whose World is replaced by a lensed copy: the World itself.
 WORLD_BEFORE = "umbra_world_before"
@@ -240,8 +240,8 @@ def load_star_sky() -> bpy.types.Image:
         return image
     path = _cache_folder() / _STAR_SKY_FILE
     if not path.is_file():
-        pixels = star_sky.star_sky(STAR_SKY_HEIGHT)
-        exr.write_exr(path, np.minimum(pixels, np.finfo(np.float16).max).astype(np.float16))
+        pixels = physics.star_sky(STAR_SKY_HEIGHT)
+        physics.write_exr(path, np.minimum(pixels, np.finfo(np.float16).max).astype(np.float16))
     image = bpy.data.images.load(str(path))
     image.name = STAR_SKY_NAME
     image.pack()

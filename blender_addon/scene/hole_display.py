@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..core.physics_api import metric
+from ..core.physics_api import physics
 
 # Blender draws Empties no smaller (scene units).
 SMALLEST_DISPLAY = 1e-4
@@ -13,4 +13,4 @@ def show_size(hole: bpy.types.ID) -> None:
     """Draw the Empty's sphere at the size of the horizon."""
     if isinstance(hole, bpy.types.Object) and hole.umbra.is_black_hole and hole.type == "EMPTY":
         settings = hole.umbra
-        hole.empty_display_size = max(metric.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)
+        hole.empty_display_size = max(physics.horizon_radius(settings.spin) * settings.mass_scale, SMALLEST_DISPLAY)

@@ -7,7 +7,7 @@ import bpy
 
 from ..core import changes
 from ..core.changes import Change
-from ..core.physics_api import disk_flux, disk_look, metric, physics
+from ..core.physics_api import physics
 from .typed import DiskSettings
 
 # Blender saves an enum's number; identifiers are the physics' own names.
@@ -15,7 +15,7 @@ PROFILES = (
     ("novikov_thorne", "Page-Thorne", "As physics has it: dark at the innermost stable orbit, brightest outside of it"),
     ("power_law", "Power Law", "Brightest at the inner edge, and dimmer outwards by a power of the radius"),
 )
-BEAMINGS = {"BOLOMETRIC": disk_look.BOLOMETRIC, "MONOCHROMATIC": disk_look.MONOCHROMATIC}
+BEAMINGS = {"BOLOMETRIC": physics.BOLOMETRIC_EXPONENT, "MONOCHROMATIC": physics.MONOCHROMATIC_EXPONENT}
 
 # As many as the physics follows.
 MOST_IMAGES = physics.MOST_CROSSINGS
@@ -26,7 +26,7 @@ DENSITY, COLOR = "DENSITY", "COLOR"
 # With a new disk, the inner edge turns round in some four seconds.
 DEFAULT_SPEED = 12.0
 DEFAULT_LOOK = "gargantua"
-_LOOK = disk_look.PRESETS[DEFAULT_LOOK]
+_LOOK = physics.DISK_PRESETS[DEFAULT_LOOK]
 
 # Fields of `DiskLook` that are properties of the same name.
 LOOK_FIELDS = (
@@ -140,8 +140,8 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         name="Temperature",
         description="Where the disk is brightest, kelvin: it decides the color",
         default=_LOOK.temperature,
-        min=disk_look.COLDEST,
-        max=disk_look.HOTTEST,
+        min=physics.COLDEST_DISK,
+        max=physics.HOTTEST_DISK,
         soft_min=1500.0,
         soft_max=30_000.0,
         subtype="COLOR_TEMPERATURE",
@@ -244,13 +244,13 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     innermost_orbit: bpy.props.FloatProperty(
         name="Innermost Stable Orbit",
         description="Radius of the innermost stable orbit of the disk's matter, units of M",
-        get=lambda settings: metric.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
+        get=lambda settings: physics.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
     )
     flux_factor: bpy.props.FloatProperty(
         name="Flux Factor",
         description="By which Page and Thorne's flux becomes 1 where it is largest",
         # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
-        get=lambda settings: 1.0 / disk_flux.peak_flux(settings.id_data.umbra.spin, settings.retrograde),
+        get=lambda settings: 1.0 / physics.peak_disk_flux(settings.id_data.umbra.spin, settings.retrograde),
     )
 
 
@@ -271,13 +271,13 @@ def disk_of(settings: DiskSettings) -> "physics.Disk | None":
     )
 
 
-def look_of(settings: DiskSettings) -> "disk_look.DiskLook":
+def look_of(settings: DiskSettings) -> "physics.DiskLook":
     """How the disk looks."""
     values = {name: getattr(settings, name) for name in LOOK_FIELDS}
-    return disk_look.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+    return physics.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
 
 
-def use_look(settings: DiskSettings, look: "disk_look.DiskLook") -> None:
+def use_look(settings: DiskSettings, look: "physics.DiskLook") -> None:
     """Set all properties of the look."""
     for name in LOOK_FIELDS:
         if getattr(settings, name) != getattr(look, name):

@@ -5,7 +5,7 @@ import bpy
 
 from ..core import changes
 from ..core.changes import Change
-from ..core.physics_api import color, lens, physics
+from ..core.physics_api import physics
 from . import output_choice
 from .typed import SceneSettings
 
@@ -58,7 +58,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         name="Lens Sphere",
         description="Radius, in M, of the sphere around the hole where bent rays begin. Objects are seen outside of it "
         "only; the rest of the picture does not depend on it",
-        default=lens.DEFAULT_SPHERE_RADIUS,
+        default=physics.DEFAULT_LENS_RADIUS,
         min=2.0,
         soft_min=5.0,
         soft_max=50.0,
@@ -85,7 +85,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     sky_temperature: bpy.props.FloatProperty(
         name="Sky Temperature",
         description="Temperature of the light, in kelvin, that the color shift assumes",
-        default=color.DEFAULT_TEMPERATURE,
+        default=physics.DEFAULT_SKY_TEMPERATURE,
         min=500.0,
         soft_max=40000.0,
         max=1e6,

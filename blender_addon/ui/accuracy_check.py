@@ -8,7 +8,7 @@ import bpy
 from ..bake import baking
 from ..bake.check import fault_of
 from ..core.errors import SceneError
-from ..core.physics_api import accuracy, physics
+from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
 from ..scene import environment, frame_setup
@@ -48,9 +48,7 @@ def check_frame(
     fault = fault_of(wanted)
     if fault is not None:
         raise SceneError(f"{fault}: press Bake This Frame first.", code="map.out-of-date")
-    steps = accuracy.accuracy_steps(
-        wanted.path, passes=list(wanted.passes), environment_width=_environment_width(scene)
-    )
+    steps = physics.accuracy_steps(wanted.path, passes=list(wanted.passes), environment_width=_environment_width(scene))
     return _progress(scene.session_uid, frame.frame, steps)
 
 
@@ -76,7 +74,7 @@ def _environment_width(scene: bpy.types.Scene) -> int:
         width = environment.read(scene).image.size[0]
     except physics.BlackHoleError:
         width = 0
-    return width or accuracy.DEFAULT_ENVIRONMENT_WIDTH
+    return width or physics.DEFAULT_ENVIRONMENT_WIDTH
 
 
 class UMBRA_OT_check_accuracy(BakeOperator, bpy.types.Operator):

@@ -3,13 +3,13 @@
 
 import bpy
 
-from ..core.physics_api import disk_look
+from ..core.physics_api import physics
 from ..scene import frame_setup
 from ..settings import disk_properties
 from .sidebar import HolePanel, UmbraPanel
 
 # Identifiers as scripts write them -> names of `PRESETS`.
-PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in disk_look.PRESETS}
+PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in physics.DISK_PRESETS}
 _PRESET_TEXTS = {
     "gargantua": ("Gargantua", "Thin, warm and even: the same brightness on both sides, as in the film"),
     "physical": ("Physical", "All as physics has it, with the side that comes towards the camera far brighter"),
@@ -36,7 +36,7 @@ class UMBRA_OT_disk_preset(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         hole = frame_setup.active_hole(context.scene)
-        disk_properties.use_look(hole.umbra.disk, disk_look.PRESETS[PRESET_NAMES[self.preset]])
+        disk_properties.use_look(hole.umbra.disk, physics.DISK_PRESETS[PRESET_NAMES[self.preset]])
         return {"FINISHED"}
 
 

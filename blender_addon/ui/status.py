@@ -9,7 +9,7 @@ import numpy as np
 
 from ..bake.check import count_baked, is_valid
 from ..bake.request import MapRequest
-from ..core.physics_api import metric, physics
+from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.shared import drawing
@@ -106,9 +106,9 @@ def _place_lines(now: FrameSetup) -> list[Line]:
     distance = now.distance
     found = [Line(f"Camera at {distance:.4g} M", "CAMERA_DATA")]
     polar_angle = float(np.arccos(np.clip(parameters.camera_position[2] / distance, -1.0, 1.0)))
-    if distance < metric.ergosphere_radius(parameters.spin, polar_angle):
+    if distance < physics.ergosphere_radius(parameters.spin, polar_angle):
         found += wrapped("inside the ergosphere: nothing can be at rest here", "INFO")
-    elif distance < metric.isco_radius(parameters.spin):
+    elif distance < physics.isco_radius(parameters.spin):
         found += wrapped("inside the innermost stable circular orbit", "INFO")
     warning = physics.unstable_orbit_warning(parameters)
     if warning is not None:

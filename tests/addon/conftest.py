@@ -28,4 +28,4 @@ def scene(tmp_path: Path) -> bpy.types.Scene:
 @pytest.fixture
 def exr(addon_module: Callable[[str], ModuleType]) -> ModuleType:
     """The installed add-on's own reader and writer of EXR files."""
-    return addon_module("core.physics_api").exr
+    return addon_module("core.physics_api").physics

@@ -112,7 +112,7 @@ def test_a_rebaked_map_of_the_same_frame_is_seen(
     scene: bpy.types.Scene, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     hole = add_hole(scene)
-    exr = addon_module("core.physics_api").exr
+    exr = addon_module("core.physics_api").physics
     bpy.ops.umbra.bake_frame()
     first = render(scene, tmp_path / "a.exr", exr)
     hole.umbra.mass_scale *= 1.5

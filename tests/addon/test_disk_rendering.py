@@ -62,9 +62,9 @@ def expected_picture(
     texture = addon_module("nodes.disk_images").streaks() if texture is None else texture
     time = frame * settings.turning_speed * scene.render.fps_base / scene.render.fps
     period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
-    light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
-    sky = modules.reference_render.render(physics.read_warp_map(path), environment_pixels(), output_size=size).image
-    picture = modules.disk_render.over_sky(sky, light, through)
+    light, through = modules.physics.disk_layers(passes, look, texture, time, period)
+    sky = modules.physics.render_reference(physics.read_warp_map(path), environment_pixels(), output_size=size).image
+    picture = modules.physics.disk_over_sky(sky, light, through)
     return picture, modules.reference_render.resize(light, size)
 
 
@@ -88,7 +88,7 @@ def test_default_disk_is_what_numpy_makes(
     hole_with_disk(scene)
     scene.render.resolution_percentage = percentage
     scene.frame_set(7)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     size = (96 * percentage // 100, 54 * percentage // 100)
     expected, light = expected_picture(scene, addon_module, tmp_path, size)
     assert picture.shape[:2] == size[::-1]
@@ -106,11 +106,11 @@ def test_every_preset_is_what_numpy_makes(
     hole = hole_with_disk(scene, retrograde=preset == "EMBER")
     assert bpy.ops.umbra.disk_preset(preset=preset) == {"FINISHED"}
     name = preset.lower().replace("_", " ")
-    for field, value in vars(modules.disk_look.PRESETS[name]).items():
+    for field, value in vars(modules.physics.DISK_PRESETS[name]).items():
         found = getattr(addon_module("settings.disk_properties").look_of(hole.umbra.disk), field)
         assert found == (value if isinstance(value, str) else pytest.approx(value, rel=1e-6)), field
     scene.frame_set(40)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     assert_same(picture, expected, light)
 
@@ -130,7 +130,7 @@ def test_one_color_inside_the_innermost_orbit_with_two_images(
         doppler_brightness=0.6,
         crossings=2,
     )
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == 2
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     assert_same(picture, expected, light)
@@ -141,7 +141,7 @@ def test_supersampled_passes_are_box_filtered(
 ) -> None:
     hole_with_disk(scene)
     scene.umbra.supersampling = "2"
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     assert_same(picture, expected, light)
 
@@ -154,7 +154,7 @@ def test_turning_keeps_its_contrast_over_a_long_shot(
     hole_with_disk(scene)
     scene.frame_start, scene.frame_end = -1000, 20_000
     scene.frame_set(frame)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     assert_same(picture, expected, light)
     bright = light.max(axis=-1) > 0.05 * light.max()
@@ -178,7 +178,7 @@ def test_pictures_of_any_image_without_a_seam(
     image.pack()
     hole = hole_with_disk(scene, texture=image, turning_speed=0.0)
     hole.rotation_euler = (0.2, 0.0, 2.0)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), values.astype(np.float64))
     assert_same(picture, expected, light)
 
@@ -206,7 +206,7 @@ def test_animated_look_is_that_of_each_frame(
     for frame in (1, 2, 3):
         scene.frame_set(frame)
         expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
-        picture, _ = modules.exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")
+        picture, _ = modules.physics.read_exr(tmp_path / f"frame_{frame:04d}.exr")
         assert_same(picture, expected, light)
 
 
@@ -242,7 +242,7 @@ def test_keyframes_are_followed_frame_by_frame(
     for frame in (1, 2, 3):
         scene.frame_set(frame)
         expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
-        pictures.append(modules.exr.read_exr(tmp_path / f"frame_{frame:04d}.exr")[0])
+        pictures.append(modules.physics.read_exr(tmp_path / f"frame_{frame:04d}.exr")[0])
         assert_same(pictures[-1], expected, light)
     assert np.abs(pictures[0] - pictures[1]).max() > 10.0 * LIGHT
 
@@ -293,7 +293,7 @@ def test_as_many_images_as_are_asked_for(
     hole = hole_with_disk(scene)
     hole.umbra.disk.crossings = images
     hole.umbra.disk.opacity = 0.3
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == images
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     assert_same(picture, expected, light)
@@ -327,7 +327,7 @@ def test_a_picture_gives_the_disk_its_colors(
         for name, value in {"doppler_color": 0.8, "doppler_brightness": 1.0, "profile": "novikov_thorne"}.items():
             setattr(hole.umbra.disk, name, value)
     scene.frame_set(30)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     premultiplied = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54), premultiplied)
     assert_same(picture, expected, light)
@@ -343,14 +343,14 @@ def test_objects_stand_in_front_of_the_disk(
 ) -> None:
     hole_with_disk(scene)
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=scene.camera.location * 0.5)
-    picture = render(scene, tmp_path / "picture.exr", modules.exr)
+    picture = render(scene, tmp_path / "picture.exr", modules.physics)
     expected, light = expected_picture(scene, addon_module, tmp_path, (96, 54))
     tree = addon_module("outputs.shared.compositor_tree").find_setup(scene)
     (link,) = tree.group.inputs["Render"].links
     layer = link.from_socket
     for each in list(tree.group.outputs["Image"].links):
         tree.tree.links.new(layer, each.to_socket)
-    foreground = render(scene, tmp_path / "foreground.exr", modules.exr)
+    foreground = render(scene, tmp_path / "foreground.exr", modules.physics)
     covered = foreground[..., 3] == 1.0
     assert (covered & (light.max(axis=-1) > 0.1)).sum() > 20, "the cube should hide a part of the disk"
     np.testing.assert_allclose(picture[covered][:, :3], foreground[covered][:, :3], atol=1e-6)
@@ -377,8 +377,8 @@ def test_saved_file_renders_the_same_without_the_add_on(
     done = run_python(code, resources=tmp_path / "plain")
     assert done.returncode == 0, done.stdout + done.stderr
     for frame in (5, 6):
-        here, _ = modules.exr.read_exr(tmp_path / f"here_{frame:04d}.exr")
-        plain, _ = modules.exr.read_exr(tmp_path / f"there_{frame:04d}.exr")
+        here, _ = modules.physics.read_exr(tmp_path / f"here_{frame:04d}.exr")
+        plain, _ = modules.physics.read_exr(tmp_path / f"there_{frame:04d}.exr")
         np.testing.assert_allclose(plain, here, atol=1e-6)
 
 
@@ -395,5 +395,5 @@ def test_headless_render_bakes_and_draws_the_disk(scene: bpy.types.Scene, tmp_pa
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert len(list((tmp_path / "maps").glob("*.exr"))) == 4
-    pixels, _ = modules.exr.read_exr(picture)
+    pixels, _ = modules.physics.read_exr(picture)
     assert pixels[..., :3].max() > 1.0, "the disk is brighter than the sky"

@@ -226,7 +226,7 @@ def test_a_missing_pass_is_magenta(
         bpy.ops.render.render(write_still=True)
     finally:
         handlers.register()
-    pixels, _ = addon_module("core.physics_api").exr.read_exr(tmp_path / "picture.exr")
+    pixels, _ = addon_module("core.physics_api").physics.read_exr(tmp_path / "picture.exr")
     np.testing.assert_allclose(pixels[..., :3], np.broadcast_to((1.0, 0.0, 1.0), pixels[..., :3].shape), atol=1e-6)
 
 
@@ -287,11 +287,11 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     scene.render.filepath = str(tmp_path / "lit.exr")
     bpy.ops.render.render(write_still=True)
     modules = addon_module("core.physics_api")
-    pixels, _ = modules.exr.read_exr(tmp_path / "lit.exr")
+    pixels, _ = modules.physics.read_exr(tmp_path / "lit.exr")
     lit = pixels[12:15, 22:26].reshape(-1, 4)
     assert (lit[:, 3] == 1.0).all()
     assert pixels[0, 0, 3] == 0.0, "beside the plate there is nothing, not the glowing disk"
-    expected = modules.disk_look.seen_color(np.array([6500.0]))[0]
+    expected = modules.physics.disk_color(np.array([6500.0]))[0]
     # The disk fills all but the horizon of what the plate sees; 256 samples a pixel, twelve pixels.
     np.testing.assert_allclose(lit[:, :3].mean(axis=0), expected, rtol=0.05)
 
@@ -318,7 +318,7 @@ def test_light_follows_keyframes(
     scene.render.filepath = str(tmp_path / "lit_####.exr")
     scene.frame_set(2)
     bpy.ops.render.render(animation=True)
-    exr = addon_module("core.physics_api").exr
+    exr = addon_module("core.physics_api").physics
     lit = [exr.read_exr(tmp_path / f"lit_{frame:04d}.exr")[0][..., :3].sum() for frame in (1, 2, 3)]
     assert lit[0] > 1.0
     # Blender's eased curve is half-way at frame 2: one stop, and three quarters.
@@ -361,7 +361,7 @@ def test_holes_of_two_scenes_keep_values_of_their_own(
     nodes = [find_node(find_setup(each).tree, "disk") for each in (scene, other)]
     spins = [each.inputs["Spin"].default_value for each in nodes]
     assert spins == pytest.approx([0.9, 0.1])
-    metric = addon_module("core.physics_api").metric
+    metric = addon_module("core.physics_api").physics
     edges = [each.inputs["Inner Edge"].default_value for each in nodes]
     assert edges == pytest.approx([metric.isco_radius(spin) for spin in spins])
 

@@ -120,7 +120,7 @@ def test_with_a_window_the_picture_is_magenta(
     shrink(scene)
     scene.umbra.map_folder = str(tmp_path / "maps")
     hole = add_hole(scene)
-    exr = addon_module("core.physics_api").exr
+    exr = addon_module("core.physics_api").physics
     good = render(scene, tmp_path / "good.exr", exr)
     shown: list[str] = []
     monkeypatch.setattr(addon_module("core.messages"), "popup", shown.append)

@@ -93,7 +93,7 @@ def test_bakes_then_renders(folder: Path, programs: dict[str, str], addon_module
     assert shares(baking) == [50.0, 100.0, 100.0]  # two chunks, of two frames and of one
     assert shares(rendering) == [50.0, 100.0, 100.0]
     assert [line.split()[-1] for line in rendering.splitlines() if "openjd_status: Rendered" in line] == ["1", "2", "3"]
-    exr = addon_module("core.physics_api").exr
+    exr = addon_module("core.physics_api").physics
     pictures = [read(folder / "pictures" / f"shot_{frame:03d}.exr", exr) for frame in (1, 2, 3)]
     assert len(list((folder / "umbra_maps").glob("*_64x36_0*.exr"))) == 3
 

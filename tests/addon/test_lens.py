@@ -269,7 +269,7 @@ def test_directions_of_the_shader_are_those_of_the_map(scene, tmp_path, exr, add
 @pytest.mark.parametrize("rays", ["IN_SHADER", "EXIT_MAP"])
 def test_the_redshift_dims_and_tints_a_uniform_world(scene, tmp_path, exr, addon_module, rays) -> None:
     """A World of one color, seen from a fast orbit: each pixel is that color times the gain of its own 1 + z."""
-    physics, color = addon_module("core.physics_api").physics, addon_module("core.physics_api").color
+    physics, color = addon_module("core.physics_api").physics, addon_module("core.physics_api").physics
     scene.world = bpy.data.worlds.new("Uniform")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.5, 0.2, 1.0)

@@ -60,9 +60,9 @@ def expected_picture(
         addon_module("nodes.disk_images").streaks(),
     )
     period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
-    light, through = modules.disk_render.disk_layers(passes, look, texture, time, period)
+    light, through = modules.physics.disk_layers(passes, look, texture, time, period)
     size = behind.shape[1], behind.shape[0]
-    return modules.disk_render.over_sky(behind, light, through), modules.reference_render.resize(light, size)
+    return modules.physics.disk_over_sky(behind, light, through), modules.reference_render.resize(light, size)
 
 
 def assert_same(picture: np.ndarray, expected: np.ndarray, light: np.ndarray) -> None:

@@ -197,7 +197,7 @@ def test_a_render_waits_for_the_map_that_another_machine_is_baking(
     assert len(written) == 1, "the render has baked the map again"
     told = capfd.readouterr().out
     assert "waiting for the warp map of frame 1, which farm-7 (process 12) bakes" in told
-    assert np.isfinite(read(tmp_path / "picture.exr", modules.exr)).all()
+    assert np.isfinite(read(tmp_path / "picture.exr", modules.physics)).all()
 
 
 def test_a_render_that_waits_can_be_stopped(

@@ -197,7 +197,7 @@ def test_the_thumbnail_shows_what_the_camera_sees(scene, preview, thumbnail, phy
     small = thumbnail.pixels(scene)
     assert small.shape == (108, 192, 4)
     scene.render.resolution_x, scene.render.resolution_y = 192, 108
-    picture = render(scene, tmp_path / "picture.exr", physics.exr)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
     linear = np.clip(picture[::-1, :, :3], 0.0, 1.0)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     assert np.quantile(np.abs(small[..., :3] - encoded), 0.95) < 0.03
@@ -219,10 +219,10 @@ def test_the_thumbnail_needs_no_world_output(scene, preview, thumbnail, output) 
 def test_a_render_reads_files_and_the_preview_comes_back(scene, preview, world_sync, physics, tmp_path) -> None:
     scene.cycles.filter_width = 0.01
     assert bpy.ops.umbra.set_output(output="WORLD") == {"FINISHED"}
-    alone = render(scene, tmp_path / "alone.exr", physics.exr)
+    alone = render(scene, tmp_path / "alone.exr", physics.physics)
     start(scene, preview)
     assert world_sync.shows_live(scene)
-    assert np.array_equal(render(scene, tmp_path / "beside.exr", physics.exr), alone)
+    assert np.array_equal(render(scene, tmp_path / "beside.exr", physics.physics), alone)
     settle(preview)
     assert world_sync.shows_live(scene)
 

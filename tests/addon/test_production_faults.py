@@ -46,7 +46,7 @@ def picture(scene: bpy.types.Scene, tmp_path: Path, modules: ModuleType, name: s
     """Render without baking anything."""
     scene.umbra.auto_bake = False
     try:
-        pixels = render(scene, tmp_path / name, modules.exr)[..., :3]
+        pixels = render(scene, tmp_path / name, modules.physics)[..., :3]
     finally:
         scene.umbra.auto_bake = True
     assert np.abs(pixels - [1.0, 0.0, 1.0]).max(axis=-1).min() > 0.01, "magenta: it has no map"
@@ -169,7 +169,7 @@ def test_names_with_spaces_and_letters_of_other_alphabets(
     (tmp_path / "picture.exr").unlink()
     assert run("clean --all") == 0
     assert not list((folder / "Größe 星 'maps' #1" / "ü b").iterdir())
-    np.testing.assert_array_equal(render(scene, tmp_path / "b.exr", modules.exr)[..., :3], first)
+    np.testing.assert_array_equal(render(scene, tmp_path / "b.exr", modules.physics)[..., :3], first)
 
 
 def library(scene: bpy.types.Scene, tmp_path: Path) -> Path:
@@ -246,7 +246,7 @@ def test_a_scene_from_a_library(scene: bpy.types.Scene, tmp_path: Path, run: Run
     linked.render.filepath = str(tmp_path / "linked.exr")
     linked.umbra.auto_bake = False
     bpy.ops.render.render(write_still=True, scene="Shot")
-    pixels = read(tmp_path / "linked.exr", modules.exr)[..., :3]
+    pixels = read(tmp_path / "linked.exr", modules.physics)[..., :3]
     assert np.abs(pixels - [1.0, 0.0, 1.0]).max(axis=-1).min() > 0.01, "magenta: it has no map"
 
 

@@ -32,7 +32,7 @@ def physics(addon_module: Callable[[str], ModuleType]) -> ModuleType:
 
 @pytest.fixture
 def reference(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("core.physics_api").reference_render
+    return addon_module("core.physics_api").physics
 
 
 @pytest.fixture

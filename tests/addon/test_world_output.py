@@ -67,7 +67,7 @@ def group(scene: bpy.types.Scene) -> bpy.types.Node:
 
 def map_of(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1):
     (path,) = Path(scene.umbra.map_folder).glob(f"*_world_{frame:04d}.exr")
-    return physics.world_map_file.read_world_map(path)
+    return physics.physics.read_world_map(path)
 
 
 def looking(scene: bpy.types.Scene, physics: ModuleType) -> np.ndarray:
@@ -86,7 +86,7 @@ def predicted(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tu
     origin, one_plus_z, visible = map_of(scene, physics, frame).look_up(looking(scene, physics))
     turned = origin @ physics.reference_render.rotation_matrix(ROTATION).T
     colors = physics.reference_render.sample_environment(environment_pixels(), turned)
-    colors *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
+    colors *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
     colors[~visible] = 0.0
     polar = np.arccos(np.abs(turned[:, 2]).clip(max=1.0))
     return colors.reshape(*SIZE[::-1], 3), (polar > math.pi / 16).reshape(SIZE[::-1])
@@ -99,7 +99,7 @@ def differences(picture: np.ndarray, expected: np.ndarray, where: np.ndarray) ->
 
 def test_cycles_shows_what_numpy_predicts(scene, physics, tmp_path) -> None:
     switch()
-    picture = render(scene, tmp_path / "picture.exr", physics.exr)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
     expected, where = predicted(scene, physics)
     assert 0.05 < (expected.max(axis=-1) == 0.0).mean() < 0.6
     found = differences(picture, expected, where)
@@ -114,7 +114,7 @@ def test_eevee_shows_what_numpy_predicts(scene, physics, tmp_path) -> None:
     scene.eevee.taa_render_samples = 1
     scene.render.filter_size = 0.0
     switch()
-    picture = render(scene, tmp_path / "picture.exr", physics.exr)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
     expected, where = predicted(scene, physics)
     found = differences(picture, expected, where)
     assert np.median(found) < 2e-3  # EEVEE composes in half floats
@@ -137,16 +137,16 @@ def test_a_camera_that_turns_needs_no_new_map_and_one_that_moves_does(scene, phy
     assert hashes[0] == hashes[1] != hashes[2]
     for frame in (1, 2, 3):
         scene.frame_set(frame)
-        picture = read(tmp_path / f"frame_{frame:04d}.exr", physics.exr)
+        picture = read(tmp_path / f"frame_{frame:04d}.exr", physics.physics)
         expected, where = predicted(scene, physics, frame)
         assert np.quantile(differences(picture, expected, where), 0.99) < 1e-4, f"frame {frame}"
 
 
 def test_a_map_that_is_out_of_date_is_baked_and_read_again(scene, physics, tmp_path) -> None:
     switch()
-    render(scene, tmp_path / "one.exr", physics.exr)
+    render(scene, tmp_path / "one.exr", physics.physics)
     scene.umbra.active_hole.umbra.spin = 0.1
-    picture = render(scene, tmp_path / "two.exr", physics.exr)
+    picture = render(scene, tmp_path / "two.exr", physics.physics)
     expected, where = predicted(scene, physics)
     assert np.quantile(differences(picture, expected, where), 0.99) < 1e-4
 
@@ -164,11 +164,11 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
     tree.links.new(gloss.outputs[0], output.inputs["Surface"])
     bpy.context.object.data.materials.append(mirror)
     normal = np.array([math.sqrt(0.5), -math.sqrt(0.5), 0.0])
-    plain = render(scene, tmp_path / "plain.exr", physics.exr)
+    plain = render(scene, tmp_path / "plain.exr", physics.physics)
     switch()
-    lensed = render(scene, tmp_path / "lensed.exr", physics.exr)
+    lensed = render(scene, tmp_path / "lensed.exr", physics.physics)
     group(scene).inputs["Lensed Light"].default_value = 0.0
-    only_camera = render(scene, tmp_path / "camera.exr", physics.exr)
+    only_camera = render(scene, tmp_path / "camera.exr", physics.physics)
     assert np.allclose(only_camera, plain, atol=1e-5)
 
     directions = looking(scene, physics)
@@ -176,7 +176,7 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
     origin, one_plus_z, visible = map_of(scene, physics).look_up(mirrored)
     turned = origin @ physics.reference_render.rotation_matrix(ROTATION).T
     expected = physics.reference_render.sample_environment(environment_pixels(), turned)
-    expected *= physics.color.redshift_gain(one_plus_z, 1.0, 1.0, physics.color.DEFAULT_TEMPERATURE)
+    expected *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
     expected[~visible] = 0.0
     found = differences(lensed, expected.reshape(*SIZE[::-1], 3), (np.abs(turned[:, 2]) < 0.98).reshape(SIZE[::-1]))
     assert np.quantile(found, 0.98) < 1e-3
@@ -184,13 +184,13 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
 
 
 def test_lensing_is_one_click(scene, physics, tmp_path) -> None:
-    plain = render(scene, tmp_path / "plain.exr", physics.exr)
+    plain = render(scene, tmp_path / "plain.exr", physics.physics)
     switch()
-    lensed = render(scene, tmp_path / "lensed.exr", physics.exr)
+    lensed = render(scene, tmp_path / "lensed.exr", physics.physics)
     assert bpy.ops.umbra.toggle_lensing() == {"FINISHED"}
-    assert np.allclose(render(scene, tmp_path / "off.exr", physics.exr), plain, atol=1e-5)
+    assert np.allclose(render(scene, tmp_path / "off.exr", physics.physics), plain, atol=1e-5)
     assert bpy.ops.umbra.toggle_lensing() == {"FINISHED"}
-    assert np.array_equal(render(scene, tmp_path / "on.exr", physics.exr), lensed)
+    assert np.array_equal(render(scene, tmp_path / "on.exr", physics.physics), lensed)
 
 
 def test_without_a_map_the_sky_is_magenta(scene, physics, modules, tmp_path) -> None:
@@ -199,7 +199,7 @@ def test_without_a_map_the_sky_is_magenta(scene, physics, modules, tmp_path) -> 
     handlers = modules("render.handlers")
     handlers.unregister()
     try:
-        picture = render(scene, tmp_path / "picture.exr", physics.exr)
+        picture = render(scene, tmp_path / "picture.exr", physics.physics)
     finally:
         handlers.register()
     assert np.array_equal(picture[..., :3], np.broadcast_to([1.0, 0.0, 1.0], picture[..., :3].shape))
@@ -261,7 +261,7 @@ def test_any_world_is_bent(scene, physics, tmp_path) -> None:
     switch()
     group(scene).inputs["Redshift Brightness"].default_value = 0.0
     group(scene).inputs["Redshift Color"].default_value = 0.0
-    picture = render(scene, tmp_path / "picture.exr", physics.exr)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
     visible = map_of(scene, physics).look_up(looking(scene, physics))[2].reshape(SIZE[::-1])
     shown = picture[..., 2] > 0.4
     assert (shown != visible).sum() <= 2
@@ -302,7 +302,7 @@ def test_any_lens_and_motion_can_be_rendered(scene, physics, tmp_path) -> None:
     owner.panorama_type = "FISHEYE_EQUIDISTANT"
     scene.umbra.active_hole.umbra.motion = "FREE_FALL"
     switch()
-    picture = render(scene, tmp_path / "picture.exr", physics.exr)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
     assert 0.02 < (picture[..., :3].max(axis=-1) == 0.0).mean() < 0.9
     data.type = "ORTHO"
     assert bpy.ops.umbra.bake_frame.poll()
@@ -312,7 +312,7 @@ def test_any_lens_and_motion_can_be_rendered(scene, physics, tmp_path) -> None:
 
 def test_a_saved_file_renders_without_the_add_on(scene, physics, tmp_path) -> None:
     switch()
-    expected = render(scene, tmp_path / "expected.exr", physics.exr)
+    expected = render(scene, tmp_path / "expected.exr", physics.physics)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     code = (
         f"bpy.ops.wm.open_mainfile(filepath={str(tmp_path / 'file.blend')!r})\n"
@@ -322,7 +322,7 @@ def test_a_saved_file_renders_without_the_add_on(scene, physics, tmp_path) -> No
     )
     done = run_python(code, resources=tmp_path / "resources")
     assert done.returncode == 0, done.stderr
-    assert np.allclose(read(tmp_path / "bare.exr", physics.exr), expected, atol=1e-5)
+    assert np.allclose(read(tmp_path / "bare.exr", physics.physics), expected, atol=1e-5)
 
 
 def test_a_failed_frame_ends_a_headless_render(scene, tmp_path) -> None:
@@ -339,19 +339,19 @@ def test_a_failed_frame_ends_a_headless_render(scene, tmp_path) -> None:
 
 def test_a_changed_group_is_mended_when_a_file_is_opened(scene, physics, tmp_path) -> None:
     switch()
-    expected = render(scene, tmp_path / "expected.exr", physics.exr)
+    expected = render(scene, tmp_path / "expected.exr", physics.physics)
     tree = group(scene).node_tree
     tree["umbra_world_version"] = 0
     tree.nodes.remove(next(node for node in tree.nodes if node.bl_idname == "ShaderNodeMath"))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
     scene = bpy.context.scene
-    assert np.allclose(render(scene, tmp_path / "again.exr", physics.exr), expected, atol=1e-6)
+    assert np.allclose(render(scene, tmp_path / "again.exr", physics.physics), expected, atol=1e-6)
 
 
 def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
     switch()
-    render(scene, tmp_path / "picture.exr", physics.exr)
+    render(scene, tmp_path / "picture.exr", physics.physics)
     (path,) = Path(scene.umbra.map_folder).glob("*.exr")
     assert modules("bake.cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
     request = modules("bake.request")
@@ -366,7 +366,7 @@ def test_a_disk_that_is_not_drawn_is_named(
     scene.umbra.active_hole.umbra.disk.enabled = True
     lines = modules("ui.status").lines(bpy.context)
     assert "is not drawn by Output: World" in " ".join(line.text for line in lines)
-    render(scene, tmp_path / "picture.exr", physics.exr)
+    render(scene, tmp_path / "picture.exr", physics.physics)
     output = capfd.readouterr()
     assert 'The disk of "Hole" is not drawn by Output: World' in output.out + output.err
 

@@ -207,7 +207,7 @@ def seen_objects(scene: object, addon_module: Callable[[str], ModuleType]) -> tu
     import bpy
 
     frame = addon_module("scene.frame_setup").read_at(scene, FRAME)
-    exits = addon_module("core.physics_api").exit_map.bake_exit_map(replace(frame.parameters, interpolation=0.0))
+    exits = addon_module("core.physics_api").physics.bake_exit_map(replace(frame.parameters, interpolation=0.0))
     scene.frame_set(FRAME)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = np.array(frame.parameters.camera_position)

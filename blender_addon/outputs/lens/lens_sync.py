@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.blender_version import OSL_COUNTS_ROWS_UPWARDS
 from ...core.errors import SceneError
-from ...core.physics_api import lens, physics
+from ...core.physics_api import physics
 from ...scene import frame_setup
 from ...scene.camera_type import is_converted
 from ...settings.scene_properties import EXIT_MAP
@@ -38,7 +38,7 @@ def exit_parameters(parameters: "physics.WarpMapParameters") -> "physics.WarpMap
 def values_of(scene: bpy.types.Scene, frame: frame_setup.FrameSetup, map_path: Path | None = None) -> dict[str, object]:
     """The shader's parameters for a frame; with an exit map, those of the variant that looks rays up."""
     settings = scene.umbra
-    values = asdict(lens.LensNumbers.of(frame.parameters))
+    values = asdict(physics.LensNumbers.of(frame.parameters))
     values |= {
         "broken": 0,
         "shift": (*frame.shift, 0.0),

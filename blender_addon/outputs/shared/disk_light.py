@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.blender_version import NODES_ARE_OPTIONAL
-from ...core.physics_api import disk_look, physics
+from ...core.physics_api import physics
 from ...nodes import disk_images
 from ...scene import disk_animation
 from ...settings import disk_properties
@@ -78,7 +78,7 @@ def follow(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
 
 
 def radiance(
-    disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, radius: Array, rows: Array | None = None
+    disk: "physics.Disk", look: "physics.DiskLook", spin: float, radius: Array, rows: Array | None = None
 ) -> Array:
     """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
 
@@ -89,17 +89,17 @@ def radiance(
         depth = np.log(radius / inner) / np.log(outer / inner)
         places = (np.arange(len(rows)) + 0.5) / len(rows)
         mean = np.stack([np.interp(depth, places, channel) for channel in rows.T], axis=-1)
-        light = disk_look.tinted_light(look, disk, spin, radius, np.ones_like(radius), mean[:, :3])
-        return light * (look.opacity * disk_look.fade(look, disk, spin, radius))[:, None]
+        light = physics.tinted_disk_light(look, disk, spin, radius, np.ones_like(radius), mean[:, :3])
+        return light * (look.opacity * physics.disk_fade(look, disk, spin, radius))[:, None]
     mean = np.full((*radius.shape, 2), 0.5)
-    thick = disk_look.density(look, disk, spin, radius, mean)
-    opacity = look.opacity * np.minimum(thick * disk_look.OPACITY_REACH, 1.0)
-    light = disk_look.emission(look, disk, spin, radius, np.ones_like(radius))
+    thick = physics.disk_density(look, disk, spin, radius, mean)
+    opacity = look.opacity * np.minimum(thick * physics.DISK_OPACITY_REACH, 1.0)
+    light = physics.disk_emission(look, disk, spin, radius, np.ones_like(radius))
     return light * (thick ** (look.gain - 1.0) * opacity)[..., None]
 
 
 def _fill(
-    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "disk_look.DiskLook", spin: float, rows: Array | None
+    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "physics.DiskLook", spin: float, rows: Array | None
 ) -> None:
     """Make the annulus, in units of M, its light at each vertex."""
     radii = np.geomspace(*disk.radii(spin), RINGS)

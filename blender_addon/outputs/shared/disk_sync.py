@@ -11,7 +11,7 @@ import bpy
 
 from ...bake.request import pass_path
 from ...core.errors import SceneError
-from ...core.physics_api import disk_flux, disk_texture, metric, orbiting_matter, physics
+from ...core.physics_api import physics
 from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
@@ -185,11 +185,11 @@ def _geometry(hole: bpy.types.Object, spin: float, disk: "physics.Disk") -> dict
     inner_moves = turning if disk.inner_radius is None else disk_animation.INNER in animated
     return {
         disk_group.SPIN: (spin, disk_animation.SPIN if turning else None),
-        disk_group.DIRECTION: (orbiting_matter.matter_direction(spin, disk.retrograde), None),
+        disk_group.DIRECTION: (physics.matter_direction(spin, disk.retrograde), None),
         disk_group.INNER: (inner, inner_path if inner_moves else None),
         disk_group.OUTER: (outer, disk_animation.OUTER if disk_animation.OUTER in animated else None),
-        disk_group.INNERMOST: (metric.isco_radius(spin, not disk.retrograde), orbit if turning else None),
-        disk_group.FLUX_FACTOR: (1.0 / disk_flux.peak_flux(spin, disk.retrograde), factor if turning else None),
+        disk_group.INNERMOST: (physics.isco_radius(spin, not disk.retrograde), orbit if turning else None),
+        disk_group.FLUX_FACTOR: (1.0 / physics.peak_disk_flux(spin, disk.retrograde), factor if turning else None),
     }
 
 
@@ -227,7 +227,7 @@ def _follow_time(
     _set(tree, node.inputs[disk_group.PERIOD], period)
     time_of_a_frame = settings.turning_speed * scene.render.fps_base / scene.render.fps
     lives = f"(frame*{time_of_a_frame / period!r})"
-    (age, _, first), (_, _, second) = disk_texture.pattern_shares(scene.frame_current * time_of_a_frame, period)
+    (age, _, first), (_, _, second) = physics.disk_pattern_shares(scene.frame_current * time_of_a_frame, period)
     for name, value, expression in (
         (disk_group.PHASE, age / period, f"{lives}-floor{lives}"),
         (disk_group.FIRST_TURN, first, _turn(f"2*floor{lives}")),
@@ -238,7 +238,7 @@ def _follow_time(
 
 def _turn(number: str) -> str:
     """2 pi times the fraction of the number of a pattern times the golden section."""
-    turns = f"{number}*{disk_texture.TURN_BETWEEN!r}"
+    turns = f"{number}*{physics.DISK_PATTERN_TURN!r}"
     return f"{2.0 * math.pi!r}*({turns}-floor({turns}))"
 
 

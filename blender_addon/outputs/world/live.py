@@ -5,7 +5,7 @@ from collections.abc import Generator
 
 import bpy
 
-from ...core.physics_api import physics, world_map
+from ...core.physics_api import physics
 from . import lensed_world, world_sync
 
 
@@ -14,11 +14,11 @@ class WorldLiveMap:
 
     def parameters(self, draft: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
         """Return what the map is made from."""
-        return world_map.world_parameters(draft, world_map.PREVIEW)
+        return physics.world_map_parameters(draft, physics.WORLD_MAP_PREVIEW_GRID)
 
-    def steps(self, parameters: "physics.WarpMapParameters") -> "Generator[float, None, world_map.WorldMap]":
+    def steps(self, parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WorldMap]":
         """Make the map step by step."""
-        return world_map.world_map_steps(parameters)
+        return physics.bake_world_map_steps(parameters)
 
     def can_show(self, scene: bpy.types.Scene) -> bool:
         """Return whether the scene's World is the lensed one."""
@@ -28,7 +28,7 @@ class WorldLiveMap:
         """Return whether the World reads a map in memory."""
         return world_sync.shows_live(scene)
 
-    def show(self, scene: bpy.types.Scene, made: "world_map.WorldMap") -> bool:
+    def show(self, scene: bpy.types.Scene, made: "physics.WorldMap") -> bool:
         """Let the World read a map; Cycles must be made to look once more."""
         world_sync.show_live(scene, made)
         return world_sync.needs_turns(scene)

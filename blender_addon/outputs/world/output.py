@@ -5,7 +5,7 @@ import bpy
 
 from ...bake.request import WORLD_MAP, MapRequest, request
 from ...core.errors import SceneError
-from ...core.physics_api import physics, world_map
+from ...core.physics_api import physics
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
 from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
@@ -72,7 +72,7 @@ class WorldOutput(Output):
 
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
         """Return the frame's world map."""
-        return [request(scene, frame, WORLD_MAP, world_map.world_parameters(frame.parameters))]
+        return [request(scene, frame, WORLD_MAP, physics.world_map_parameters(frame.parameters))]
 
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Refuse: world maps have no pixels of a picture."""

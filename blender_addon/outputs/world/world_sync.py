@@ -8,7 +8,7 @@ from ...bake.folder import folder
 from ...bake.request import WORLD_MAP, sequence_path
 from ...core import messages
 from ...core.errors import SceneError
-from ...core.physics_api import world_map
+from ...core.physics_api import physics
 from ...nodes import world_group
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
@@ -110,7 +110,7 @@ def point_at_files(scene: bpy.types.Scene) -> None:
     if hole is None:
         point_at_nothing(scene)
         return
-    columns, rows = world_map.FINAL
+    columns, rows = physics.WORLD_MAP_GRID
     _point_at_path(scene, sequence_path(scene, hole.name, (columns, rows + 1), WORLD_MAP))
 
 
@@ -158,7 +158,7 @@ def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
     return image if image in live_images(world) else None
 
 
-def show_live(scene: bpy.types.Scene, made: "world_map.WorldMap") -> None:
+def show_live(scene: bpy.types.Scene, made: "physics.WorldMap") -> None:
     """Let the World read a map that is in memory; always through the same image, or through two in turn."""
     world = lensed_world.lensed_world(scene)
     tree = lensed_world.group_of(world)
@@ -201,7 +201,7 @@ def show_again(scene: bpy.types.Scene) -> None:
     rows, columns = shown.size[1], shown.size[0]
     texture = np.empty(rows * columns * 4, np.float32)
     shown.pixels.foreach_get(texture)
-    show_live(scene, world_map.WorldMap(texture.reshape(rows, columns, 4), {}))
+    show_live(scene, physics.WorldMap(texture.reshape(rows, columns, 4), {}))
 
 
 def drop_live(scene: bpy.types.Scene) -> None:
