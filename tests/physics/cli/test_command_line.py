@@ -2,26 +2,16 @@
 """The command line as a user meets it: a process of its own, its exit status and its words."""
 
 import json
-import subprocess
-import sys
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 
 from physics import read_warp_map
 from physics.files.disk_pass_file import pass_path
 from physics.images.exr import read_exr, write_exr
 from physics.images.png import srgb_from_linear
-
-ROOT = Path(__file__).parents[3]
-
-
-def run(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "physics", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
 
 
 def read_png(path):

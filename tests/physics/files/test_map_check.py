@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_command_line import run
+from commands import run
 
 from physics import (
     Disk,
