@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import bpy.utils.previews
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
@@ -24,6 +25,8 @@ SKY_ROWS = 256
 SQUARES = 18
 GRAYS = (0.02, 0.12)
 
+Array = NDArray[np.floating[Any]]
+
 # Arguments of `physics.render_reference`, and the groups' sockets that say the same.
 _SOCKETS = {
     "exposure": "Exposure",
@@ -36,7 +39,7 @@ _SOCKETS = {
 @dataclass(frozen=True)
 class _Sky:
     key: tuple[object, ...]
-    pixels: np.ndarray
+    pixels: Array
 
 
 def _no_collection() -> bpy.utils.previews.ImagePreviewCollection | None:
@@ -59,7 +62,7 @@ def icon(scene: bpy.types.Scene) -> int:
     return 0 if preview is None else preview.icon_id
 
 
-def pixels(scene: bpy.types.Scene) -> np.ndarray | None:
+def pixels(scene: bpy.types.Scene) -> Array | None:
     """Return the thumbnail's pixels, shape (height, width, 4), row 0 at the bottom; None if there is none."""
     preview = _preview_of(scene)
     if preview is None:
@@ -70,7 +73,7 @@ def pixels(scene: bpy.types.Scene) -> np.ndarray | None:
     return values.reshape(height, width, 4)
 
 
-def show(scene: bpy.types.Scene, picture: np.ndarray) -> None:
+def show(scene: bpy.types.Scene, picture: Array) -> None:
     """Keep a picture, shape (height, width, 4), row 0 at the bottom, as the scene's thumbnail."""
     if _collection.now is None:
         _collection.now = bpy.utils.previews.new()
@@ -96,7 +99,7 @@ def clear() -> None:
     _collection.clear()
 
 
-def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float, None, np.ndarray | None]:
+def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float, None, Array | None]:
     """Make the thumbnail of a frame step by step; None if the scene is gone."""
     camera = parameters.camera
     longer = max(camera.width, camera.height)
@@ -119,10 +122,10 @@ def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float,
     return picture[::-1]
 
 
-def _encoded(values: np.ndarray) -> np.ndarray:
+def _encoded(values: Array) -> Array:
     """Linear light as a screen shows it (sRGB)."""
     held = np.clip(values, 0.0, 1.0)
-    encoded: np.ndarray = np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055)
+    encoded: Array = np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055)
     return encoded
 
 
@@ -151,7 +154,7 @@ def key(scene: bpy.types.Scene) -> tuple[object, ...]:
     return (_image_key(_image_of(scene)), *look(scene).items())
 
 
-def _sky_of(scene: bpy.types.Scene) -> np.ndarray:
+def _sky_of(scene: bpy.types.Scene) -> Array:
     """The scene's sky, small, row 0 at the top; it is read once for each image."""
     image = _image_of(scene)
     known = _skies.find(scene)
@@ -172,14 +175,14 @@ def _image_key(image: bpy.types.Image | None) -> tuple[object, ...]:
     return () if image is None else (image.name, image.filepath, tuple(image.size), image.is_dirty)
 
 
-def _squares() -> np.ndarray:
+def _squares() -> Array:
     row, column = np.mgrid[0:SKY_ROWS, 0 : 2 * SKY_ROWS]
     size = SKY_ROWS / SQUARES
     odd = ((row // size + column // size) % 2).astype(int)
     return np.repeat(np.array(GRAYS)[odd][..., None], 3, axis=-1)
 
 
-def _shrunk(image: bpy.types.Image) -> np.ndarray:
+def _shrunk(image: bpy.types.Image) -> Array:
     """An image's colors at the thumbnail's resolution, scene-linear."""
     width, height = image.size
     if width * height == 0:
@@ -193,4 +196,5 @@ def _shrunk(image: bpy.types.Image) -> np.ndarray:
     small = small[..., :3] if image.channels >= 3 else np.repeat(small[..., :1], 3, axis=-1)
     if not image.is_float and image.colorspace_settings.name == "sRGB":
         small = np.where(small <= 0.04045, small / 12.92, ((small + 0.055) / 1.055) ** 2.4)
-    return small.astype(np.float64)
+    shrunk: Array = small.astype(np.float64)
+    return shrunk

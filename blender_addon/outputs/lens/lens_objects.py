@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...scene import frame_setup
+from ...scene.frame_setup import Matrix, Vector
 from . import lens_disk
 
 # Types that a camera sees.
@@ -62,7 +63,7 @@ def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_s
     return Placement(*(tuple(sorted(each)) for each in (inside, nearer - inside, amid - nearer - inside)))
 
 
-def _distance(matrix: np.ndarray, low: np.ndarray, high: np.ndarray, point: np.ndarray) -> float:
+def _distance(matrix: Matrix, low: Vector, high: Vector, point: Vector) -> float:
     """Distance of a point from a transformed box, or a little less where the transformation is not a rotation."""
     axes, origin = matrix[:3, :3], matrix[:3, 3]
     lengths = np.maximum(np.linalg.norm(axes, axis=0), 1e-12)

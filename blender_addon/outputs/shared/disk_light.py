@@ -95,7 +95,8 @@ def radiance(
     thick = physics.disk_density(look, disk, spin, radius, mean)
     opacity = look.opacity * np.minimum(thick * physics.DISK_OPACITY_REACH, 1.0)
     light = physics.disk_emission(look, disk, spin, radius, np.ones_like(radius))
-    return light * (thick ** (look.gain - 1.0) * opacity)[..., None]
+    shown: Array = light * (thick ** (look.gain - 1.0) * opacity)[..., None]
+    return shown
 
 
 def _fill(
