@@ -116,10 +116,15 @@ class Claims:
 def _create(path: Path, content: bytes) -> bool:
     """Create a file, or return False if it exists."""
     try:
-        with path.open("xb") as stream:
-            stream.write(content)
+        stream = path.open("xb")
     except FileExistsError:
         return False
+    try:
+        with stream:
+            stream.write(content)
+    except OSError:  # the disk is full
+        path.unlink(missing_ok=True)
+        raise
     return True
 
 

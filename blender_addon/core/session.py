@@ -3,7 +3,12 @@
 
 All of it hangs on the one object `SESSION`. Each piece has a defined life, after which it is as if it had just been
 made. State of a scene is kept under the scene's `session_uid`, which survives renaming, undo and redo; names do not.
+
+Annotations are not evaluated here: `typing` would keep the generic classes, and with them `bpy`, for ever, and Blender
+4.5 as a Python module hangs when the process ends before it is released.
 """
+
+from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterator

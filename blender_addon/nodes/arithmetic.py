@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, overload
+from typing import Any
 
-from .builder import Direction, Float, Number, Operand, TreeBuilder, Value, Vector
+from .builder import Direction, Float, Number, Operand, TreeBuilder, Value, Vector, overload
 
 
 def _builder_of(*operands: Operand) -> TreeBuilder:

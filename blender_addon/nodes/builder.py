@@ -10,9 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Self, TypeAlias, overload
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import bpy
+
+if TYPE_CHECKING:
+    from typing import overload
+else:
+
+    def overload(function: object) -> object:
+        """Stand in for typing's, which keeps each function, and with it `bpy`, for ever.
+
+        Blender 4.5 as a Python module hangs when the process ends before `bpy` is released.
+        """
+        return function
+
 
 Socket: TypeAlias = bpy.types.NodeSocket
 Triple: TypeAlias = tuple[float, float, float]

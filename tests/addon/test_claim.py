@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -215,6 +216,20 @@ def test_a_claim_that_was_never_written(target: Path) -> None:
         assert not mine.take(target)
         os.utime(claim_path(target), (1.0, 1.0))
         assert mine.take(target)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no device that is always full")
+def test_a_full_disk_leaves_no_claim(target: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    create = Path.open
+
+    def full(path: Path, mode: str) -> IO[bytes]:
+        create(path, mode).close()
+        return create(Path("/dev/full"), "wb")
+
+    monkeypatch.setattr(Path, "open", full)
+    with Claims() as mine, pytest.raises(OSError, match="No space left"):
+        mine.take(target)
+    assert not list(target.parent.iterdir())
 
 
 def test_a_claim_that_somebody_removed_does_not_disturb_its_holder(
