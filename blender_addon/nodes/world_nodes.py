@@ -152,20 +152,8 @@ def _read_header(builder: TreeBuilder) -> _Header:
         _texel(builder, (part + 0.5) / physics.WORLD_MAP_HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
     )
     lowest, stamp, width = last.separate()
-    return _Header(
-        outward=outward,
-        offset=offset,
-        polar=polar,
-        slope=slope,
-        motion=motion,
-        beta=beta,
-        shift=shift,
-        constant=constant,
-        lowest=lowest,
-        stamp=stamp,
-        width=maximum(1.0, width),
-        height=maximum(1.0, height),
-    )
+    width, height = maximum(1.0, width), maximum(1.0, height)
+    return _Header(outward, offset, polar, slope, motion, beta, shift, constant, lowest, stamp, width, height)
 
 
 def _seen_by_fido(looking: Vector, header: _Header) -> Vector:
