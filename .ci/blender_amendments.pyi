@@ -226,6 +226,7 @@ class NodeTreeInterfaceItem:
     socket_type: str
 
 class NodeTreeInterfaceSocket:
+    in_out: str
     subtype: str
     min_value: float
     max_value: float
