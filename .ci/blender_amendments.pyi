@@ -17,7 +17,7 @@ class Scene:
     render: RenderSettings
     display_settings: ColorManagedDisplaySettings
 
-# --- pointers that Blender never leaves empty where an add-on can see them ---------------------------
+# --- pointers that are never empty where the add-on follows them ------------------------------------
 
 class Context:
     scene: Scene
@@ -54,14 +54,12 @@ class Image:
 
 class DepsgraphObjectInstance:
     object: Object
-    instance_object: Object
-    parent: Object
 
 class World:
-    node_tree: NodeTree
+    node_tree: NodeTree  # once nodes are in use
 
 class Material:
-    node_tree: NodeTree
+    node_tree: NodeTree  # once nodes are in use
 
 class UIPopupMenu:
     layout: UILayout
@@ -226,6 +224,7 @@ class NodeTreeInterfaceItem:
     socket_type: str
 
 class NodeTreeInterfaceSocket:
+    in_out: str
     subtype: str
     min_value: float
     max_value: float

@@ -59,7 +59,6 @@ class BlenderPlugin(Plugin):
     def __init__(self, options: Options) -> None:
         super().__init__(options)
         self._classes = {each.name: each for each in self._parsed()}
-        self._amended: set[int] = set()
 
     def _parsed(self) -> list[ClassDef]:
         text = AMENDMENTS.read_text(encoding="utf-8")
@@ -76,12 +75,11 @@ class BlenderPlugin(Plugin):
         return self._amend if name in self._classes and module == ELSEWHERE.get(name, "bpy.types") else None
 
     def _amend(self, context: ClassDefContext) -> None:
-        if id(context.cls) in self._amended:  # a class is analyzed again until all names in it are known
+        members, body = self._classes[context.cls.name].defs.body, context.cls.defs.body
+        if body[-1] is members[-1]:  # done: a class is analyzed again until all names in it are known
             return
-        self._amended.add(id(context.cls))
-        members = self._classes[context.cls.name].defs.body
         names = {_name(each) for each in members}
-        context.cls.defs.body[:] = [each for each in context.cls.defs.body if _name(each) not in names] + members
+        body[:] = [each for each in body if _name(each) not in names] + members
 
     def get_additional_deps(self, file: MypyFile) -> list[tuple[int, str, int]]:
         """Let the add-on's modules depend on the declarations, which they use without importing them."""
@@ -94,6 +92,8 @@ class BlenderPlugin(Plugin):
 
         def registered(context: AttributeContext) -> Type:
             assert isinstance(context.api, TypeChecker)
+            if DECLARATIONS not in context.api.modules:  # only other programs than the add-on are checked
+                return context.default_attr_type
             declared = context.api.modules[DECLARATIONS].names[REGISTERED[fullname]].node
             assert isinstance(declared, TypeInfo)
             return Instance(declared, [])

@@ -65,11 +65,13 @@ def frames_text(frames: Iterable[int]) -> str:
 
 def ranges(frames: Iterable[int]) -> Iterator[tuple[int, int]]:
     """Yield first and last frame of each run of consecutive frames."""
-    first = last = None
+    run: tuple[int, int] | None = None
     for frame in frames:
-        if last is not None and frame != last + 1:
-            yield first, last
-            first = None
-        first, last = frame if first is None else first, frame
-    if last is not None:
-        yield first, last
+        if run is not None and frame == run[1] + 1:
+            run = run[0], frame
+            continue
+        if run is not None:
+            yield run
+        run = frame, frame
+    if run is not None:
+        yield run

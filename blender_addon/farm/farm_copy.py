@@ -118,11 +118,12 @@ def _drivers_of_settings() -> Iterator[tuple[bpy.types.ID, bpy.types.FCurve]]:
         if group.type != "COLLECTION":
             continue
         for block in getattr(bpy.data, group.identifier):
-            for owner in (block, getattr(block, "node_tree", None)):
+            tree: bpy.types.ID | None = getattr(block, "node_tree", None)
+            for owner in (block,) if tree is None else (block, tree):
                 animation = getattr(owner, "animation_data", None)
                 for curve in animation.drivers if animation is not None else ():
                     targets = [target for each in curve.driver.variables for target in each.targets]
-                    if any(target.data_path.startswith(_ADDON) for target in targets):
+                    if any(target.id is not None and target.data_path.startswith(_ADDON) for target in targets):
                         yield owner, curve
 
 
@@ -142,13 +143,13 @@ def _channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
 def _source_value(owner: bpy.types.ID, curve: bpy.types.FCurve) -> float:
     variables = curve.driver.variables
     plain = curve.driver.type in {"SUM", "AVERAGE"} or curve.driver.expression.strip() == variables[0].name
-    if len(variables) != 1 or variables[0].type != "SINGLE_PROP" or not plain:
+    target = variables[0].targets[0]
+    if len(variables) != 1 or variables[0].type != "SINGLE_PROP" or not plain or target.id is None:
         raise SceneError(
             f'The driver of "{owner.name}", {curve.data_path}, works with settings of the black hole, which a Blender '
             "without the add-on does not know: replace it by keyframes.",
             code="farm.driver",
         )
-    target = variables[0].targets[0]
     return float(target.id.path_resolve(target.data_path))
 
 
@@ -196,11 +197,11 @@ class _Curve:
         self.owner, path, index = track
         self.had_animation = self.owner.animation_data is not None
         animation = self.owner.animation_data_create()
-        self.new_action = None
-        if animation.action is None:
-            animation.action = self.new_action = bpy.data.actions.new(f"Umbra Farm {self.owner.name}")
-        action = animation.action
-        self.curve = action.fcurve_ensure_for_datablock(self.owner, path, index=index)
+        self.action = animation.action or bpy.data.actions.new(f"Umbra Farm {self.owner.name}")
+        self.is_new = animation.action is None
+        if self.is_new:
+            animation.action = self.action
+        self.curve = self.action.fcurve_ensure_for_datablock(self.owner, path, index=index)
         if len(self.curve.keyframe_points):
             raise SceneError(
                 f'"{self.owner.name}" has keyframes of its own on {path}, which the black hole writes: remove them.',
@@ -214,13 +215,12 @@ class _Curve:
 
     def remove(self) -> None:
         """Take the curve out, and with it the action that was made for it."""
-        animation = self.owner.animation_data
-        if self.new_action is None:
-            for bag in _channelbags(animation.action):
+        if not self.is_new:
+            for bag in _channelbags(self.action):
                 if self.curve in bag.fcurves.values():
                     bag.fcurves.remove(self.curve)
             return
-        animation.action = None
-        bpy.data.actions.remove(self.new_action)
+        self.owner.animation_data_create().action = None
+        bpy.data.actions.remove(self.action)
         if not self.had_animation:
             self.owner.animation_data_clear()

@@ -21,6 +21,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, TextIO
 
 import bpy
 
@@ -117,14 +118,15 @@ def map_images(scene: bpy.types.Scene) -> Iterator[bpy.types.Image]:
             "The lensed World reads no maps: open the file with the add-on and save it again.",
             code="farm.world-without-maps",
         )
-    yield from {node.image for node in nodes}
+    yield from {node.image for node in nodes if node.image is not None}
 
 
 def map_files(scene: bpy.types.Scene, frame: int) -> Iterator[Path]:
     """The files that are read for a frame: a warp map and the disk's passes beside it, or a world map."""
     for image in map_images(scene):
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
-        beginning, number = re.fullmatch(r"(.*?)(\d*)", path.stem).groups()
+        beginning = path.stem.rstrip("0123456789")
+        number = path.stem[len(beginning) :]
         yield path.with_name(f"{beginning}{frame % SEQUENCE_LENGTH:0{len(number)}d}{path.suffix}")
 
 
@@ -137,15 +139,16 @@ def is_used(node: bpy.types.Node) -> bool:
 def check_light(scene: bpy.types.Scene) -> None:
     """Refuse a disk that lights the scene while its settings are animated: only the add-on makes its mesh follow."""
     for each in scene.objects:
-        animation = each.parent.animation_data if LIGHT in each and each.parent is not None else None
-        if animation is None:
+        hole = each.parent if LIGHT in each else None
+        animation = hole.animation_data if hole is not None else None
+        if hole is None or animation is None:
             continue
-        layers = [] if animation.action is None else animation.action.layers
+        layers = list(animation.action.layers) if animation.action is not None else []
         bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
         curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
         if any(curve.data_path.startswith(SETTINGS) for curve in curves):
             raise Fault(
-                f'The disk of "{each.parent.name}" lights the scene, and its settings are animated: render with the '
+                f'The disk of "{hole.name}" lights the scene, and its settings are animated: render with the '
                 "add-on, or switch Light the Scene off.",
                 code="farm.lighting-disk",
             )
@@ -166,7 +169,7 @@ def check_alone(scene: bpy.types.Scene, frames: list[int]) -> None:
     cameras = [scene.camera, *(marker.camera for marker in scene.timeline_markers)]
     lensed = any(each is not None and each.type == "CAMERA" and LENS in each.data for each in cameras)
     tree = compositor_of(scene)
-    drivers = tree.animation_data.drivers if tree is not None and tree.animation_data is not None else []
+    drivers = list(tree.animation_data.drivers) if tree is not None and tree.animation_data is not None else []
     targets = [
         target
         for curve in drivers
@@ -209,7 +212,7 @@ def check(frames: list[int]) -> None:
 class Failures:
     """Passes on what is written to it, and tells the scheduler of the first failure among it."""
 
-    def __init__(self, stream) -> None:
+    def __init__(self, stream: TextIO) -> None:
         self.stream = stream
         self.told = False
 
@@ -219,7 +222,7 @@ class Failures:
             tell("fail", text.removeprefix(FAILURE).strip())
         return self.stream.write(text)
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
 
 
@@ -264,7 +267,7 @@ def bake(frames: list[int], blender: str, file: str) -> None:
             code="farm.no-blender",
         ) from error
     failure, done = None, 0
-    for line in process.stdout:
+    for line in process.stdout or ():
         print(line, end="", flush=True)
         text = line.strip()
         match = FRAME_DONE.fullmatch(text)

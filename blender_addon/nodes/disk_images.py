@@ -109,9 +109,9 @@ def mean_of_rows(image: bpy.types.Image) -> FloatArray | None:
     small = image.copy()
     try:
         small.scale(*(min(each, MEANS_SIZE) for each in image.size))
-        pixels = np.empty(len(small.pixels), np.float32)
-        small.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(small.size[1], small.size[0], -1)[::-1]
+        values = np.empty(len(small.pixels), np.float32)
+        small.pixels.foreach_get(values)
+        pixels = values.reshape(small.size[1], small.size[0], -1)[::-1]
         if pixels.shape[2] == 3:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
         if not image.is_float:  # byte images have the file's values: not linear, not premultiplied
@@ -120,7 +120,8 @@ def mean_of_rows(image: bpy.types.Image) -> FloatArray | None:
                 linear = ((color + 0.055) / 1.055) ** 2.4
                 pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, linear)
             pixels[..., :3] *= pixels[..., 3:]
-        return pixels.mean(axis=1).astype(np.float64)
+        means: FloatArray = pixels.mean(axis=1).astype(np.float64)
+        return means
     finally:
         bpy.data.images.remove(small)
 

@@ -132,21 +132,21 @@ class VersionedGroup:
         wanted = {(spec.in_out, spec.name): spec for spec in (*self.outputs, *self.inputs)}
         kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
         for item in list(interface.items_tree):
-            if item.item_type == "SOCKET":
+            if isinstance(item, bpy.types.NodeTreeInterfaceSocket):
                 key = (item.in_out, self.former_names.get((item.in_out, item.name), item.name))
                 if key in wanted and key not in kept and item.socket_type == wanted[key].socket_type:
                     kept[key] = item
         survivors = set(kept.values())
         for item in [item for item in interface.items_tree if item not in survivors]:
             interface.remove(item)
-        added = []
+        added: list[SocketSpec] = []
         for position, (key, spec) in enumerate(wanted.items()):
-            item = kept.get(key)
-            if item is None:
-                item = interface.new_socket(spec.name, in_out=spec.in_out, socket_type=spec.socket_type)
+            socket = kept.get(key)
+            if socket is None:
+                socket = interface.new_socket(spec.name, in_out=spec.in_out, socket_type=spec.socket_type)
                 added.append(spec)
-            _describe(item, spec)
-            interface.move(item, position)
+            _describe(socket, spec)
+            interface.move(socket, position)
         return [spec for spec in added if spec.in_out == "INPUT"]
 
 

@@ -51,7 +51,7 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         until = perf_counter() + TIMER_INTERVAL
-        while perf_counter() < until:
+        while self._steps is not None and perf_counter() < until:
             try:
                 result = self._go_on(self._steps, context)
             except physics.BlackHoleError as error:
@@ -72,8 +72,9 @@ class UMBRA_OT_save_farm_copy(bpy.types.Operator):
         try:
             share = next(steps)
         except StopIteration as end:
-            self.report({"INFO"}, f"Wrote {end.value.name}.")
-            return end.value
+            path: Path = end.value
+            self.report({"INFO"}, f"Wrote {path.name}.")
+            return path
         if context is not None:
             context.window_manager.progress_update(share)
             context.workspace.status_text_set(f"Saving the farm copy: {share:.0%} done.  Esc stops.")
@@ -114,7 +115,8 @@ class UMBRA_OT_save_farm_templates(bpy.types.Operator):
         self.report({"INFO"}, f"Wrote {', '.join(path.name for path in written)}.")
         if farm_copy.needs_copy(scene):
             try:
-                bpy.ops.umbra.save_farm_copy("EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT")
+                context_of_call = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+                bpy.ops.umbra.save_farm_copy(context_of_call)  # type: ignore[attr-defined]  # registered by the add-on
             except RuntimeError as error:  # what the other operator has reported, with its code
                 self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
                 return {"CANCELLED"}

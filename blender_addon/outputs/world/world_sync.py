@@ -84,8 +84,11 @@ def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
     return None if shared else image
 
 
-def _file_image(world: bpy.types.World) -> bpy.types.Image:
-    """The image that reads the maps of a lensed World: the one in use, or another."""
+def _file_image(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    """The image that reads the scene's maps: the one in use, or another; None without a lensed World."""
+    world = lensed_world.lensed_world(scene)
+    if world is None:
+        return None
     present = _own(world, lensed_world.FILE_IMAGE)
     if present is None:
         present = map_image(FILE_IMAGE_NAME)
@@ -95,10 +98,9 @@ def _file_image(world: bpy.types.World) -> bpy.types.Image:
 
 
 def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
-    world = lensed_world.lensed_world(scene)
-    if world is None:
+    image = _file_image(scene)
+    if image is None:
         return
-    image = _file_image(world)
     if image.filepath != path:
         image.filepath = path
     _point(scene, image)
@@ -121,17 +123,16 @@ def point_at_nothing(scene: bpy.types.Scene) -> None:
 
 def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
     """Let the World read the same files from another folder."""
-    world = lensed_world.lensed_world(scene)
-    if world is not None:
-        name = bpy.path.basename(_file_image(world).filepath)
-        _point_at_path(scene, blender_folder + name)
+    image = _file_image(scene)
+    if image is not None:
+        _point_at_path(scene, blender_folder + bpy.path.basename(image.filepath))
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:
     """Let Blender read the maps anew from their files."""
-    world = lensed_world.lensed_world(scene)
-    if world is not None:
-        _file_image(world).reload()
+    image = _file_image(scene)
+    if image is not None:
+        image.reload()
 
 
 # --- the preview's map ----------------------------------------------------------------------------
