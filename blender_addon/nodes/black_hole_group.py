@@ -35,7 +35,7 @@ from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 2
+GROUP_VERSION = 3
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import bpy
@@ -58,8 +58,6 @@ class VersionedGroup:
     outputs: tuple[SocketSpec, ...]
     build: Callable[[TreeBuilder, Values], Values]
     """Adds all nodes between the group's inputs and its outputs, given and returned by socket name."""
-    former_names: dict[tuple[str, str], str] = field(default_factory=dict)
-    """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
     tree_type: str = TREE_TYPE
     node_type: str = GROUP_NODE_TYPE
 
@@ -133,7 +131,7 @@ class VersionedGroup:
         kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
         for item in list(interface.items_tree):
             if item.item_type == "SOCKET":
-                key = (item.in_out, self.former_names.get((item.in_out, item.name), item.name))
+                key = (item.in_out, item.name)
                 if key in wanted and key not in kept and item.socket_type == wanted[key].socket_type:
                     kept[key] = item
         survivors = set(kept.values())

@@ -8,6 +8,7 @@ import bpy
 from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
+from . import saved_names
 from .typed import DiskSettings
 
 # Blender saves an enum's number; identifiers are the physics' own names.
@@ -68,8 +69,10 @@ def _amount(name: str, field: str, description: str) -> Any:
     )
 
 
-class UmbraDiskProperties(bpy.types.PropertyGroup):
+class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGroup):
     """A thin disk of matter around the hole. The first six decide what is baked, the others how it looks."""
+
+    FORMER_CHOICES = saved_names.DISK_CHOICES
 
     enabled: bpy.props.BoolProperty(
         name="Disk",
@@ -252,6 +255,9 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
         get=lambda settings: 1.0 / physics.peak_disk_flux(settings.id_data.umbra.spin, settings.retrograde),
     )
+
+
+saved_names.accept(UmbraDiskProperties, saved_names.DISK)
 
 
 def shows_picture(settings: DiskSettings) -> bool:

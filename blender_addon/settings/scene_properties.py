@@ -6,7 +6,7 @@ import bpy
 from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
-from . import output_choice
+from . import output_choice, saved_names
 from .typed import SceneSettings
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
@@ -209,6 +209,9 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         default=True,
         options=set(),
     )
+
+
+saved_names.accept(UmbraSceneProperties, saved_names.SCENE)
 
 
 def _refresh(settings: UmbraSceneProperties) -> None:
