@@ -21,7 +21,7 @@ BEAMINGS = {"BOLOMETRIC": physics.BOLOMETRIC_EXPONENT, "MONOCHROMATIC": physics.
 # As many as the physics follows.
 MOST_IMAGES = physics.MOST_CROSSINGS
 
-# How the artist's picture is used; identifiers are saved in files.
+# Items of the enum `texture_use`: how the artist's picture is used.
 DENSITY, COLOR = "DENSITY", "COLOR"
 
 # With a new disk, the inner edge turns round in some four seconds.
