@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import bpy
 
+from ..core.physics_api import physics
 from .builder import TreeBuilder
 from .image_nodes import SETTINGS_ARE_SOCKETS
 
@@ -39,6 +40,21 @@ class SocketSpec:
     subtype: str = "NONE"
     """Blender's unit or widget, such as "FACTOR"; colors have none."""
     hide_value: bool = False
+
+
+def setting_socket(setting: physics.Setting) -> SocketSpec:
+    """Return the input of a row of the tables `physics.DISK_SETTINGS` and `physics.SKY_SETTINGS`."""
+    low, high = setting.limits
+    choices = ", ".join(f"{each.socket_value:g} is {each.label}" for each in setting.choices)
+    return SocketSpec(
+        setting.socket,
+        "NodeSocketFloat",
+        f"{setting.sentence}: {choices}" if choices else setting.sentence,
+        default=setting.socket_value(setting.default),
+        minimum=low,
+        maximum=high,
+        subtype=setting.subtype,
+    )
 
 
 @dataclass(frozen=True)

@@ -177,8 +177,8 @@ def _rename(owner: Any, attribute: str) -> None:
 
 def _rename_animation(animation: bpy.types.AnimData, owner: bpy.types.ID) -> None:
     """Rename in a data-block's keyframes, also those in strips, and in its drivers."""
-    strips = [strip for track in animation.nla_tracks for strip in track.strips]
-    for user in (animation, *strips):
+    users: list[Any] = [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
+    for user in users:
         if user.action is not None and user.action_slot is not None:
             for layer in user.action.layers:
                 for strip in layer.strips:

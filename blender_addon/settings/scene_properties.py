@@ -11,6 +11,7 @@ from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
 from . import output_choice, saved_names
+from .table_properties import property_of
 from .typed import SceneSettings
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
@@ -72,34 +73,6 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         min=2.0,
         soft_min=5.0,
         soft_max=50.0,
-        update=lambda settings, _context: _refresh(settings),
-    )
-    redshift_color: bpy.props.FloatProperty(
-        name="Redshift Color",
-        description="How much the change of frequency changes colors: 0 not at all, 1 as physics has it",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        update=lambda settings, _context: _refresh(settings),
-    )
-    redshift_brightness: bpy.props.FloatProperty(
-        name="Redshift Brightness",
-        description="How much the change of frequency changes brightness: 0 not at all, 1 as physics has it",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        update=lambda settings, _context: _refresh(settings),
-    )
-    sky_temperature: bpy.props.FloatProperty(
-        name="Sky Temperature",
-        description="Temperature of the light, in kelvin, that the color shift assumes",
-        default=physics.DEFAULT_SKY_TEMPERATURE,
-        min=500.0,
-        soft_max=40000.0,
-        max=1e6,
-        step=10000,
         update=lambda settings, _context: _refresh(settings),
     )
     live_preview: bpy.props.BoolProperty(
@@ -224,6 +197,11 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
 
 
+# The rows of the sky, but for the exposure, which is the node groups' alone.
+for _name in ("redshift_color", "redshift_brightness", "sky_temperature"):
+    UmbraSceneProperties.__annotations__[_name] = property_of(
+        physics.SKY_SETTINGS[_name], lambda settings, _context: _refresh(settings)
+    )
 saved_names.accept(UmbraSceneProperties, saved_names.SCENE)
 
 

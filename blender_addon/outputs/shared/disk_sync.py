@@ -203,11 +203,10 @@ def _follow_geometry(
 def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object) -> None:
     settings = hole.umbra.disk
     animated = animated_paths(hole)
-    for field, name in disk_group.LOOK_SOCKETS.items():
-        path = f"umbra.disk.{field}"
-        _follow(tree, node.inputs[name], getattr(settings, field), hole, path if path in animated else None)
-    node.inputs[disk_group.BEAMING].default_value = disk_properties.BEAMINGS[settings.beaming]
-    node.inputs[disk_group.PAGE_THORNE].default_value = float(settings.profile != "power_law")
+    for name, setting in physics.DISK_SETTINGS.items():
+        path = f"umbra.disk.{name}"
+        value = setting.socket_value(disk_properties.value_of(settings, name))
+        _follow(tree, node.inputs[setting.socket], value, hole, path if path in animated else None)
     images = {
         disk_group.COLORS: disk_images.ensure_colors(),
         disk_group.TEXTURE: settings.texture or disk_images.ensure_texture(),
