@@ -17,7 +17,7 @@ from functools import cache
 import bpy
 
 from ..core.physics_api import physics
-from . import disk_nodes
+from . import disk_images, disk_nodes
 from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
@@ -37,7 +37,7 @@ def _number(name: str, description: str, default: float, low: float = -1e6, high
     return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=low, maximum=high)
 
 
-BEHIND, COLORS, TEXTURE = "Behind", "Colors", "Texture"
+BEHIND = "Behind"
 OUTPUT, IMAGE = "Disk", "Image"
 PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
 
@@ -50,11 +50,7 @@ INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
 _BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
 _INPUTS = (
-    _picture(COLORS, "Table of the colors of hot bodies (Non-Color)"),
-    _picture(
-        TEXTURE,
-        "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
-    ),
+    *(_picture(name, picture.description) for name, picture in disk_images.PICTURES.items()),
     _number(PHASE, "How far the pattern of the streaks is through its life, 0 to 1", 0.0, 0.0, 1.0),
     _number(FIRST_TURN, "Angle by which the first pattern is turned, radians", 0.0),
     _number(SECOND_TURN, "Angle by which the second pattern is turned, radians", 0.0),
@@ -166,8 +162,8 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
 def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
         disk_pass=values[PASS],
-        colors=values[COLORS],
-        texture=values[TEXTURE],
+        colors=values["Colors"],
+        texture=values["Texture"],
         phase=values[PHASE],
         first_turn=values[FIRST_TURN],
         second_turn=values[SECOND_TURN],

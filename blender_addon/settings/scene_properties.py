@@ -21,6 +21,9 @@ ACCURACIES = {
     "REFERENCE": (1e-11, 0.0),
 }
 
+# Rows of `physics.SKY_SETTINGS` that are properties; the exposure is an input of the node groups only.
+SKY_PROPERTIES = ("redshift_color", "redshift_brightness", "sky_temperature")
+
 # Items of the enum `lens_rays`.
 EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
@@ -197,8 +200,7 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
     )
 
 
-# The rows of the sky, but for the exposure, which is the node groups' alone.
-for _name in ("redshift_color", "redshift_brightness", "sky_temperature"):
+for _name in SKY_PROPERTIES:
     UmbraSceneProperties.__annotations__[_name] = property_of(
         physics.SKY_SETTINGS[_name], lambda settings, _context: _refresh(settings)
     )
