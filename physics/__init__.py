@@ -49,25 +49,30 @@ from .light.disk_flux import page_thorne_flux
 from .light.disk_flux import peak_flux as peak_disk_flux
 from .light.disk_flux import peak_radius as peak_disk_radius
 from .light.disk_flux import relative_flux as relative_disk_flux
-from .light.disk_look import BOLOMETRIC as BOLOMETRIC_EXPONENT
-from .light.disk_look import COLDEST as COLDEST_DISK
 from .light.disk_look import COLORS as DISK_COLOR_COUNT
-from .light.disk_look import HOTTEST as HOTTEST_DISK
-from .light.disk_look import MONOCHROMATIC as MONOCHROMATIC_EXPONENT
 from .light.disk_look import OPACITY_REACH as DISK_OPACITY_REACH
-from .light.disk_look import PRESETS as DISK_PRESETS
-from .light.disk_look import SMALLEST_ALPHA, SMALLEST_G, DiskLook
+from .light.disk_look import SMALLEST_ALPHA, SMALLEST_G
 from .light.disk_look import density as disk_density
 from .light.disk_look import emission as disk_emission
 from .light.disk_look import fade as disk_fade
 from .light.disk_look import seen_color as disk_color
 from .light.disk_look import shade as shade_disk
 from .light.disk_look import tinted_light as tinted_disk_light
+from .light.disk_settings import BOLOMETRIC as BOLOMETRIC_EXPONENT
+from .light.disk_settings import COLDEST as COLDEST_DISK
+from .light.disk_settings import DISK_SETTINGS, DiskLook
+from .light.disk_settings import HOTTEST as HOTTEST_DISK
+from .light.disk_settings import MONOCHROMATIC as MONOCHROMATIC_EXPONENT
+from .light.disk_settings import PRESET_TABLE as DISK_PRESET_TABLE
+from .light.disk_settings import PRESETS as DISK_PRESETS
 from .light.disk_texture import TURN_BETWEEN as DISK_PATTERN_TURN
 from .light.disk_texture import disk_texture
 from .light.disk_texture import pattern_period as disk_pattern_period
 from .light.disk_texture import pattern_shares as disk_pattern_shares
 from .light.milky_way import galactic_axes
+from .light.settings import Choice, Setting
+from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
+from .light.sky_settings import SKY_SETTINGS
 from .light.star_sky import star_sky
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
 from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
@@ -126,7 +131,9 @@ __all__ = [
     "DISK_PASS_FORMAT",
     "DISK_PATTERN_TURN",
     "DISK_PRESETS",
+    "DISK_PRESET_TABLE",
     "DISK_PROFILES",
+    "DISK_SETTINGS",
     "EXIT_MAP_FORMAT",
     "HOTTEST_DISK",
     "IDENTITY",
@@ -138,6 +145,8 @@ __all__ = [
     "MOTIONS",
     "RESIZE_HALVE_ABOVE",
     "SECOND_RADIATION_CONSTANT",
+    "SKY_ARGUMENTS",
+    "SKY_SETTINGS",
     "SMALLEST_ALPHA",
     "SMALLEST_G",
     "SMALLEST_ONE_PLUS_Z",
@@ -153,6 +162,7 @@ __all__ = [
     "Background",
     "BlackHoleError",
     "Cancelled",
+    "Choice",
     "Disk",
     "DiskAccuracy",
     "DiskLook",
@@ -170,6 +180,7 @@ __all__ = [
     "PanoramaCamera",
     "PerspectiveCamera",
     "ReferencePicture",
+    "Setting",
     "TraceResult",
     "UnstableOrbitWarning",
     "WarpMap",

@@ -9,6 +9,8 @@ SCENE_OWNS_COMPOSITOR = bpy.app.version < (5, 0)
 NODES_ARE_OPTIONAL = bpy.app.version < (5, 0)
 # Since 5.0 interpolation and extension of Map UV are sockets.
 MAP_UV_HAS_MENUS = bpy.app.version >= (5, 0)
+# Before 5.0 the values of registered properties are custom properties of the same name; since then they lie apart.
+PROPERTIES_ARE_APART = bpy.app.version >= (5, 0)
 # Since 5.2 Cycles counts the rows of a texture in OSL from the bottom.
 OSL_COUNTS_ROWS_UPWARDS = bpy.app.version >= (5, 2)
 

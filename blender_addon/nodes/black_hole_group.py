@@ -32,10 +32,10 @@ import bpy
 from ..core.physics_api import physics
 from . import black_hole_nodes
 from .builder import TreeBuilder
-from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 2
+GROUP_VERSION = 3
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
@@ -76,42 +76,7 @@ STRENGTH = SocketSpec(
     minimum=0.0,
     maximum=1.0e6,
 )
-EXPOSURE = SocketSpec(
-    "Exposure",
-    "NodeSocketFloat",
-    "Brightens the sky by this many stops, without touching the rendered scene",
-    default=0.0,
-    minimum=-32.0,
-    maximum=32.0,
-)
-REDSHIFT_COLOR = SocketSpec(
-    "Redshift Color",
-    "NodeSocketFloat",
-    "How much the frequency shift changes the color of the sky: 0 is off, 1 is physical",
-    default=1.0,
-    minimum=0.0,
-    maximum=1.0,
-    subtype="FACTOR",
-)
-REDSHIFT_BRIGHTNESS = SocketSpec(
-    "Redshift Brightness",
-    "NodeSocketFloat",
-    "How much the frequency shift changes the brightness of the sky: 0 is off, 1 is physical, "
-    "(1 + z) to the power of -4",
-    default=1.0,
-    minimum=0.0,
-    maximum=1.0,
-    subtype="FACTOR",
-)
-TEMPERATURE = SocketSpec(
-    "Sky Temperature",
-    "NodeSocketFloat",
-    "Color temperature of the sky's light (kelvin) from which the shift of its color is computed",
-    default=physics.DEFAULT_SKY_TEMPERATURE,
-    minimum=1000.0,
-    maximum=40000.0,
-    subtype="COLOR_TEMPERATURE",
-)
+EXPOSURE, REDSHIFT_COLOR, REDSHIFT_BRIGHTNESS, TEMPERATURE = map(setting_socket, physics.SKY_SETTINGS.values())
 DISK = SocketSpec(
     "Disk",
     "NodeSocketColor",

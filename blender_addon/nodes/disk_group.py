@@ -17,12 +17,12 @@ from functools import cache
 import bpy
 
 from ..core.physics_api import physics
-from . import disk_nodes
+from . import disk_images, disk_nodes
 from .builder import TreeBuilder
-from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup
+from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Disk"
-GROUP_VERSION = 2
+GROUP_VERSION = 3
 """Raised whenever the groups' sockets or nodes change; groups with another number are rebuilt."""
 
 VERSION_KEY = "umbra_disk_version"
@@ -37,45 +37,20 @@ def _number(name: str, description: str, default: float, low: float = -1e6, high
     return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=low, maximum=high)
 
 
-def _factor(name: str, description: str, default: float) -> SocketSpec:
-    return SocketSpec(name, "NodeSocketFloat", description, default=default, minimum=0.0, maximum=1.0, subtype="FACTOR")
-
-
-BEHIND, COLORS, TEXTURE = "Behind", "Colors", "Texture"
+BEHIND = "Behind"
 OUTPUT, IMAGE = "Disk", "Image"
 PASS, LIGHT, THROUGH = "Pass", "Light", "Through"  # of the group inside
 
-_LOOK = physics.DiskLook()
-
-LOOK_SOCKETS = {
-    "temperature": "Temperature",
-    "doppler_color": "Doppler Color",
-    "doppler_brightness": "Doppler Brightness",
-    "color_variation": "Color Variation",
-    "falloff": "Falloff",
-    "exponent": "Falloff Power",
-    "exposure": "Disk Exposure",
-    "opacity": "Opacity",
-    "streaks": "Streaks",
-    "clumps": "Clumps",
-    "inner_softness": "Inner Softness",
-    "outer_softness": "Outer Softness",
-    "gain": "Contrast of Light",
-}
+LOOK_SOCKETS = {name: setting.socket for name, setting in physics.DISK_SETTINGS.items()}
 """Field of `DiskLook`, and property of the disk -> the socket that follows it."""
 
-BEAMING, PAGE_THORNE, PERIOD = "Beaming", "Page-Thorne", "Pattern Period"
-PHASE, FIRST_TURN, SECOND_TURN = "Pattern Phase", "First Turn", "Second Turn"
+PHASE, FIRST_TURN, SECOND_TURN, PERIOD = "Pattern Phase", "First Turn", "Second Turn", "Pattern Period"
 SPIN, DIRECTION, INNER, OUTER = "Spin", "Direction", "Inner Edge", "Outer Edge"
 INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
 _BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
 _INPUTS = (
-    _picture(COLORS, "Table of the colors of hot bodies (Non-Color)"),
-    _picture(
-        TEXTURE,
-        "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
-    ),
+    *(_picture(name, picture.description) for name, picture in disk_images.PICTURES.items()),
     _number(PHASE, "How far the pattern of the streaks is through its life, 0 to 1", 0.0, 0.0, 1.0),
     _number(FIRST_TURN, "Angle by which the first pattern is turned, radians", 0.0),
     _number(SECOND_TURN, "Angle by which the second pattern is turned, radians", 0.0),
@@ -86,37 +61,7 @@ _INPUTS = (
     _number(OUTER, "Radius of the outer edge, units of M", 20.0, 0.0),
     _number(INNERMOST, "Radius of the innermost stable orbit, units of M", 6.0, 0.0),
     _number(FLUX_FACTOR, "By which Page and Thorne's flux becomes 1 where it is largest", 7000.0, 0.0),
-    _number(PAGE_THORNE, "1: the brightness follows Page and Thorne's flux, 0: a power of the radius", 1.0, 0.0, 1.0),
-    _number(LOOK_SOCKETS["exponent"], "Power of the radius by which the brightness falls", _LOOK.exponent, 0.0, 20.0),
-    SocketSpec(
-        LOOK_SOCKETS["temperature"],
-        "NodeSocketFloat",
-        "Temperature where the disk is brightest (kelvin)",
-        default=_LOOK.temperature,
-        minimum=physics.COLDEST_DISK,
-        maximum=physics.HOTTEST_DISK,
-        subtype="COLOR_TEMPERATURE",
-    ),
-    _factor(LOOK_SOCKETS["doppler_color"], "How much the disk's motion changes its color", _LOOK.doppler_color),
-    _factor(
-        LOOK_SOCKETS["doppler_brightness"],
-        "How much the disk's motion changes its brightness",
-        _LOOK.doppler_brightness,
-    ),
-    _number(BEAMING, "Power of the frequency ratio in the brightness: 4, or 3 for one color", 4.0, 3.0, 4.0),
-    _factor(LOOK_SOCKETS["color_variation"], "How much cooler the dim parts are", _LOOK.color_variation),
-    _factor(LOOK_SOCKETS["falloff"], "How far the brightness follows the profile", _LOOK.falloff),
-    _number(LOOK_SOCKETS["exposure"], "Brightens the disk by this many stops", _LOOK.exposure, -32.0, 32.0),
-    _factor(LOOK_SOCKETS["opacity"], "How much the densest parts hide what is behind", _LOOK.opacity),
-    _factor(LOOK_SOCKETS["streaks"], "How much the streaks thin the disk out", _LOOK.streaks),
-    _factor(LOOK_SOCKETS["clumps"], "How much the clumps thin the disk out", _LOOK.clumps),
-    _factor(
-        LOOK_SOCKETS["inner_softness"], "Share of the disk over which its inner edge fades in", _LOOK.inner_softness
-    ),
-    _factor(
-        LOOK_SOCKETS["outer_softness"], "Share of the disk over which its outer edge fades out", _LOOK.outer_softness
-    ),
-    _number(LOOK_SOCKETS["gain"], "How much brighter dense streaks are than thin ones", _LOOK.gain, 1.0, 8.0),
+    *(setting_socket(setting) for setting in physics.DISK_SETTINGS.values()),
 )
 _OUTPUTS = (
     SocketSpec(OUTPUT, "NodeSocketColor", "The disk, premultiplied, with its coverage as alpha", in_out="OUTPUT"),
@@ -217,8 +162,8 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
 def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
         disk_pass=values[PASS],
-        colors=values[COLORS],
-        texture=values[TEXTURE],
+        colors=values["Colors"],
+        texture=values["Texture"],
         phase=values[PHASE],
         first_turn=values[FIRST_TURN],
         second_turn=values[SECOND_TURN],
@@ -229,7 +174,5 @@ def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
         outer=values[OUTER],
         innermost=values[INNERMOST],
         flux_factor=values[FLUX_FACTOR],
-        page_thorne=values[PAGE_THORNE],
-        beaming=values[BEAMING],
         **{field: values[name] for field, name in LOOK_SOCKETS.items()},
     )

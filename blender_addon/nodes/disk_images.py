@@ -6,6 +6,7 @@ The table is a column of pixels, its first value at the top.
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.physics_api import physics
+from ..settings.typed import DiskSettings
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -131,3 +133,30 @@ def remove_unused() -> None:
     for image in list(bpy.data.images):
         if image.name.startswith((FORMER_PROFILE_NAME, COLORS_NAME, TEXTURE_NAME)) and image.users == 0:
             bpy.data.images.remove(image)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that the node group looks up."""
+
+    description: str
+    """Of the group's input."""
+    role: str
+    """Of the Image node, see `outputs.shared.compositor_tree`."""
+    image: Callable[[DiskSettings], bpy.types.Image]
+    """Returns the image for the disk's settings, and makes it if need be."""
+
+
+PICTURES = {
+    "Colors": Picture(
+        "Table of the colors of hot bodies (Non-Color)",
+        "disk_colors",
+        lambda _settings: ensure_colors(),
+    ),
+    "Texture": Picture(
+        "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
+        "disk_texture",
+        lambda settings: settings.texture or ensure_texture(),
+    ),
+}
+"""Name of the group's input -> what it reads."""

@@ -44,7 +44,7 @@ class DiskInputs:
     outer: Float
     innermost: Float
     flux_factor: Float
-    page_thorne: Float
+    profile: Float
     exponent: Float
     temperature: Float
     doppler_color: Float
@@ -253,7 +253,7 @@ def _flux(inputs: DiskInputs, terms: _FluxTerms, radius: Float) -> Float:
         under = under * way
     steady = total * 1.5 * inputs.flux_factor / under * radius.greater_than(inputs.innermost)
     power = (inputs.inner / maximum(radius, inputs.inner)) ** inputs.exponent
-    return maximum(0.0, where(inputs.page_thorne, steady, power))
+    return maximum(0.0, where(inputs.profile, steady, power))
 
 
 def _look_up(table: Vector, rows: Float, place: Float) -> Vector:

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import bpy
 
+from ..core.physics_api import physics
 from .builder import TreeBuilder
 from .image_nodes import SETTINGS_ARE_SOCKETS
 
@@ -41,6 +42,21 @@ class SocketSpec:
     hide_value: bool = False
 
 
+def setting_socket(setting: physics.Setting) -> SocketSpec:
+    """Return the input of a row of the tables `physics.DISK_SETTINGS` and `physics.SKY_SETTINGS`."""
+    low, high = setting.limits
+    choices = ", ".join(f"{each.socket_value:g} is {each.label}" for each in setting.choices)
+    return SocketSpec(
+        setting.socket,
+        "NodeSocketFloat",
+        f"{setting.sentence}: {choices}" if choices else setting.sentence,
+        default=setting.socket_value(setting.default),
+        minimum=low,
+        maximum=high,
+        subtype=setting.subtype,
+    )
+
+
 @dataclass(frozen=True)
 class VersionedGroup:
     """A kind of node group: its sockets, and the function that adds its nodes.
@@ -58,8 +74,6 @@ class VersionedGroup:
     outputs: tuple[SocketSpec, ...]
     build: Callable[[TreeBuilder, Values], Values]
     """Adds all nodes between the group's inputs and its outputs, given and returned by socket name."""
-    former_names: dict[tuple[str, str], str] = field(default_factory=dict)
-    """(in_out, former name) -> present name of sockets renamed since version 1; migration keeps their links."""
     tree_type: str = TREE_TYPE
     node_type: str = GROUP_NODE_TYPE
 
@@ -133,7 +147,7 @@ class VersionedGroup:
         kept: dict[tuple[str, str], bpy.types.NodeTreeInterfaceSocket] = {}
         for item in list(interface.items_tree):
             if isinstance(item, bpy.types.NodeTreeInterfaceSocket):
-                key = (item.in_out, self.former_names.get((item.in_out, item.name), item.name))
+                key = (item.in_out, item.name)
                 if key in wanted and key not in kept and item.socket_type == wanted[key].socket_type:
                     kept[key] = item
         survivors = set(kept.values())

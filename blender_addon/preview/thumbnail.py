@@ -15,6 +15,7 @@ from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import registry
 from ..scene import environment
+from ..settings.scene_properties import SKY_PROPERTIES
 
 # Pixels of the longer side.
 SIDE = 192
@@ -28,12 +29,7 @@ GRAYS = (0.02, 0.12)
 Array = NDArray[np.floating[Any]]
 
 # Arguments of `physics.render_reference`, and the groups' sockets that say the same.
-_SOCKETS = {
-    "exposure": "Exposure",
-    "color_amount": "Redshift Color",
-    "brightness_amount": "Redshift Brightness",
-    "temperature": "Sky Temperature",
-}
+_SOCKETS = {argument: physics.SKY_SETTINGS[name].socket for name, argument in physics.SKY_ARGUMENTS.items()}
 
 
 @dataclass(frozen=True)
@@ -131,12 +127,7 @@ def _encoded(values: Array) -> Array:
 
 def look(scene: bpy.types.Scene) -> dict[str, Any]:
     """How the sky is placed and shifted, as `physics.render_reference` takes it; as it is where that cannot be read."""
-    settings = scene.umbra
-    values: dict[str, Any] = {
-        "color_amount": settings.redshift_color,
-        "brightness_amount": settings.redshift_brightness,
-        "temperature": settings.sky_temperature,
-    }
+    values: dict[str, Any] = {physics.SKY_ARGUMENTS[name]: getattr(scene.umbra, name) for name in SKY_PROPERTIES}
     placed = registry.of(scene).look(scene)
     values |= {name: placed[socket] for name, socket in _SOCKETS.items() if socket in placed}
     try:

@@ -25,6 +25,7 @@ from ..outputs import frames, refreshing, registry
 from ..outputs.shared import disk_light
 from ..preview import live_preview
 from ..scene import frame_setup
+from ..settings import saved_names
 
 Handler = TypeVar("Handler", bound=Callable[..., None])
 persistent: Callable[[Handler], Handler] = bpy.app.handlers.persistent
@@ -86,6 +87,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     now = _renders.of(scene)
     now.has_failed = now.is_noted = False
     _guarded(lambda _scene: live_preview.suspend(), scene)
+    _guarded(lambda _scene: saved_names.migrate(), scene)  # a script may have made keyframes by former names
     output = registry.of(scene)
     if not output.is_in_use(scene):
         return
@@ -199,11 +201,18 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     """A file was opened: bring what older versions of this add-on have made up to date."""
     SESSION.end(Life.FILE)
     live_preview.forget()
+    saved_names.migrate()
     for scene in bpy.data.scenes:
         if scene.library is None:
             registry.of(scene).on_load(scene)
             refreshing.refresh_disk_or_warn(scene)  # a render refuses what this only tells
     live_preview.start_again()
+
+
+@persistent
+def on_import_post(_imported: object = None, _unused: object = None) -> None:
+    """Data of another file was linked or appended."""
+    saved_names.migrate()
 
 
 @persistent
@@ -247,6 +256,7 @@ _HANDLERS = {
     "render_complete": on_render_end,
     "render_cancel": on_render_end,
     "load_post": on_load_post,
+    "blend_import_post": on_import_post,
     "save_pre": on_save_pre,
     "save_post": on_save_post,
     "undo_post": on_undo_post,

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.physics_api import physics
-from ..settings.disk_properties import BEAMINGS, LOOK_FIELDS
+from ..settings.disk_properties import value_of
 
 SPIN, INNER, OUTER = "umbra.spin", "umbra.disk.inner_radius", "umbra.disk.outer_radius"
 
@@ -75,12 +75,11 @@ def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]
 
 def look_at(hole: bpy.types.Object, frame: float) -> "physics.DiskLook":
     """How the hole's disk looks at a frame."""
-    settings = hole.umbra.disk
     values: dict[str, Any] = {
-        name: settings.profile if name == "profile" else value_at(hole, f"umbra.disk.{name}", frame)
-        for name in LOOK_FIELDS
+        name: value_of(hole.umbra.disk, name) if setting.choices else value_at(hole, f"umbra.disk.{name}", frame)
+        for name, setting in physics.DISK_SETTINGS.items()
     }
-    return physics.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+    return physics.DiskLook(**values)
 
 
 def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:

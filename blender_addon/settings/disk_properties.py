@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the artist sets of a hole's accretion disk: `object.umbra.disk`."""
+"""The settings of a hole's accretion disk: `object.umbra.disk`.
+
+Those of its look are the rows of the table `physics.DISK_SETTINGS`.
+"""
 
 from typing import Any
 
@@ -8,43 +11,19 @@ import bpy
 from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
+from . import saved_names
+from .table_properties import property_of
 from .typed import DiskSettings
-
-# Blender saves an enum's number; identifiers are the physics' own names.
-PROFILES = (
-    ("novikov_thorne", "Page-Thorne", "As physics has it: dark at the innermost stable orbit, brightest outside of it"),
-    ("power_law", "Power Law", "Brightest at the inner edge, and dimmer outwards by a power of the radius"),
-)
-BEAMINGS = {"BOLOMETRIC": physics.BOLOMETRIC_EXPONENT, "MONOCHROMATIC": physics.MONOCHROMATIC_EXPONENT}
 
 # As many as the physics follows.
 MOST_IMAGES = physics.MOST_CROSSINGS
 
-# How the artist's picture is used; identifiers are saved in files.
+# Items of the enum `texture_use`: how the artist's picture is used.
 DENSITY, COLOR = "DENSITY", "COLOR"
 
 # With a new disk, the inner edge turns round in some four seconds.
 DEFAULT_SPEED = 12.0
 DEFAULT_LOOK = "gargantua"
-_LOOK = physics.DISK_PRESETS[DEFAULT_LOOK]
-
-# Fields of `DiskLook` that are properties of the same name.
-LOOK_FIELDS = (
-    "profile",
-    "exponent",
-    "temperature",
-    "doppler_color",
-    "doppler_brightness",
-    "color_variation",
-    "falloff",
-    "exposure",
-    "opacity",
-    "streaks",
-    "clumps",
-    "inner_softness",
-    "outer_softness",
-    "gain",
-)
 
 
 def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
@@ -56,20 +35,10 @@ def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
     changes.notify(Change.DISK, settings.id_data)
 
 
-def _amount(name: str, field: str, description: str) -> Any:
-    return bpy.props.FloatProperty(
-        name=name,
-        description=description,
-        default=getattr(_LOOK, field),
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        update=_changed,
-    )
+class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGroup):
+    """A thin disk of matter around the hole. The first six decide what is baked."""
 
-
-class UmbraDiskProperties(bpy.types.PropertyGroup):
-    """A thin disk of matter around the hole. The first six decide what is baked, the others how it looks."""
+    FORMER_CHOICES = saved_names.DISK_CHOICES
 
     enabled: bpy.props.BoolProperty(
         name="Disk",
@@ -119,83 +88,6 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
         max=MOST_IMAGES,
         update=_changed,
         options=set(),
-    )
-    profile: bpy.props.EnumProperty(
-        name="Profile",
-        description="How brightness and temperature change with the radius",
-        items=tuple((*each, number) for number, each in enumerate(PROFILES)),
-        default=_LOOK.profile,
-        update=_changed,
-        options=set(),
-    )
-    exponent: bpy.props.FloatProperty(
-        name="Falloff Power",
-        description="Power of the radius by which the brightness falls",
-        default=_LOOK.exponent,
-        min=0.0,
-        max=20.0,
-        update=_changed,
-    )
-    temperature: bpy.props.FloatProperty(
-        name="Temperature",
-        description="Where the disk is brightest, kelvin: it decides the color",
-        default=_LOOK.temperature,
-        min=physics.COLDEST_DISK,
-        max=physics.HOTTEST_DISK,
-        soft_min=1500.0,
-        soft_max=30_000.0,
-        subtype="COLOR_TEMPERATURE",
-        update=_changed,
-    )
-    doppler_color: _amount(
-        "Doppler Color",
-        "doppler_color",
-        "How much motion and gravity change the disk's color: 0 not at all, 1 as physics has it",
-    )
-    doppler_brightness: _amount(
-        "Doppler Brightness",
-        "doppler_brightness",
-        "How much motion and gravity change the disk's brightness: 0 not at all, 1 as physics has it, which makes the "
-        "side that comes towards the camera far brighter",
-    )
-    beaming: bpy.props.EnumProperty(
-        name="Light",
-        description="What the brightness counts",
-        items=(
-            ("BOLOMETRIC", "All Light", "The light of all wavelengths: the frequency ratio to the power of 4", 0),
-            ("MONOCHROMATIC", "One Color", "The light of a narrow band: the frequency ratio to the power of 3", 1),
-        ),
-        default="BOLOMETRIC",
-        update=_changed,
-        options=set(),
-    )
-    color_variation: _amount(
-        "Color Variation", "color_variation", "How much cooler the dim parts are: at 0 the disk has one temperature"
-    )
-    falloff: _amount("Falloff", "falloff", "How far the brightness follows the profile: at 0 it is the same throughout")
-    exposure: bpy.props.FloatProperty(
-        name="Exposure",
-        description="Brightens the disk by this many stops",
-        default=_LOOK.exposure,
-        min=-32.0,
-        max=32.0,
-        soft_min=-8.0,
-        soft_max=8.0,
-        update=_changed,
-    )
-    opacity: _amount("Opacity", "opacity", "How much the densest parts hide what is behind")
-    streaks: _amount("Streaks", "streaks", "How much the streaks thin the disk out")
-    clumps: _amount("Clumps", "clumps", "How much the clumps thin the disk out")
-    inner_softness: _amount("Inner Softness", "inner_softness", "Share of the disk over which its inner edge fades in")
-    outer_softness: _amount("Outer Softness", "outer_softness", "Share of the disk over which its outer edge fades out")
-    gain: bpy.props.FloatProperty(
-        name="Contrast of Light",
-        description="How much brighter dense streaks are than thin ones",
-        default=_LOOK.gain,
-        min=1.0,
-        max=8.0,
-        soft_max=3.0,
-        update=_changed,
     )
     turning_speed: bpy.props.FloatProperty(
         name="Turning Speed",
@@ -254,6 +146,13 @@ class UmbraDiskProperties(bpy.types.PropertyGroup):
     )
 
 
+# The rows of the look; a new disk has the default look.
+for _name, _setting in physics.DISK_SETTINGS.items():
+    _default = getattr(physics.DISK_PRESETS[DEFAULT_LOOK], _name)
+    UmbraDiskProperties.__annotations__[_name] = property_of(_setting, _changed, _default)
+saved_names.accept(UmbraDiskProperties, saved_names.DISK)
+
+
 def shows_picture(settings: DiskSettings) -> bool:
     """Whether the disk has the colors of the artist's picture."""
     return settings.texture is not None and settings.texture_use == COLOR
@@ -271,18 +170,24 @@ def disk_of(settings: DiskSettings) -> "physics.Disk | None":
     )
 
 
+def value_of(settings: DiskSettings, name: str) -> Any:
+    """Return a setting of the look as the value of the field of `DiskLook`: a str, an int or a float."""
+    value = getattr(settings, name)
+    choices = physics.DISK_SETTINGS[name].choices
+    return next(each.value for each in choices if each.identifier == value) if choices else value
+
+
 def look_of(settings: DiskSettings) -> "physics.DiskLook":
-    """How the disk looks."""
-    values = {name: getattr(settings, name) for name in LOOK_FIELDS}
-    return physics.DiskLook(**values, beaming=BEAMINGS[settings.beaming])
+    """Return how the disk looks."""
+    return physics.DiskLook(**{name: value_of(settings, name) for name in physics.DISK_SETTINGS})
 
 
 def use_look(settings: DiskSettings, look: "physics.DiskLook") -> None:
     """Set all properties of the look."""
-    for name in LOOK_FIELDS:
-        if getattr(settings, name) != getattr(look, name):
-            setattr(settings, name, getattr(look, name))
-    settings.beaming = next(name for name, power in BEAMINGS.items() if power == look.beaming)
+    for name, setting in physics.DISK_SETTINGS.items():
+        value = getattr(look, name)
+        if value_of(settings, name) != value:
+            setattr(settings, name, setting.identifier(value) if setting.choices else value)
 
 
 CLASSES = (UmbraDiskProperties,)

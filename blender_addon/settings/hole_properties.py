@@ -15,7 +15,7 @@ DEFAULT_MASS_SCALE = 0.35
 
 CAMERA_ANIMATION = "CAMERA_ANIMATION"
 
-# Identifiers are saved in files: Blender's enum -> the physics' name of the same motion.
+# Identifier of the enum `motion` -> name of the same motion in physics.
 MOTIONS = {
     "FIDO": "fido",
     "STATIC": "static",
@@ -76,24 +76,28 @@ class UmbraHoleProperties(bpy.types.PropertyGroup):
                 "FIDO",
                 "Carried by Space",
                 "Held in place, and carried round by the hole's rotation (the local fiducial observer)",
+                0,
             ),
-            ("STATIC", "At Rest", "At rest against the stars; impossible inside the ergosphere"),
+            ("STATIC", "At Rest", "At rest against the stars; impossible inside the ergosphere", 1),
             (
                 "CIRCULAR",
                 "Circular Orbit",
                 "Abreast of the circular orbit of the same radius that runs with the hole's rotation",
+                2,
             ),
             (
                 "CIRCULAR_RETROGRADE",
                 "Circular Orbit, Retrograde",
                 "Abreast of the circular orbit of the same radius that runs against the hole's rotation",
+                3,
             ),
-            ("FREE_FALL", "Free Fall", "Falling in, from rest at infinity"),
+            ("FREE_FALL", "Free Fall", "Falling in, from rest at infinity", 4),
             (
                 CAMERA_ANIMATION,
                 "Camera Animation",
                 "As the camera's own animation moves it in the scene, "
                 "measured at each frame against the speed of light set below",
+                5,
             ),
         ),
         default="FIDO",

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a scene's black hole is rendered: `scene.umbra`."""
+"""How a scene's black hole is rendered: `scene.umbra`.
+
+Files hold the numbers of enum items, not their identifiers: an item keeps its number for good
+(`tests/data/saved_enums.json`).
+"""
 
 import bpy
 
 from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
-from . import output_choice
+from . import output_choice, saved_names
+from .table_properties import property_of
 from .typed import SceneSettings
 
 # Accuracy -> errors of direction, radians, allowed to the tracing of a ray and to interpolation between rays.
@@ -16,9 +21,13 @@ ACCURACIES = {
     "REFERENCE": (1e-11, 0.0),
 }
 
+# Rows of `physics.SKY_SETTINGS` that are properties; the exposure is an input of the node groups only.
+SKY_PROPERTIES = ("redshift_color", "redshift_brightness", "sky_temperature")
+
+# Items of the enum `lens_rays`.
 EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
-# Blender saves an enum's number, so a method keeps the one it has here.
+# Items of the enum `method`.
 METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
 
 
@@ -48,8 +57,13 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         name="Rays",
         description="Where the camera takes its bent rays from when rendering",
         items=(
-            (EXIT_MAP, "Exit Map", "From a baked map, where it holds; beside the shadow the camera traces them itself"),
-            (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render"),
+            (
+                EXIT_MAP,
+                "Exit Map",
+                "From a baked map, where it holds; beside the shadow the camera traces them itself",
+                0,
+            ),
+            (IN_SHADER, "No Bake", "Each ray is traced by the camera itself: nothing to bake, a slower render", 1),
         ),
         default=EXIT_MAP,
         options=set(),
@@ -62,34 +76,6 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         min=2.0,
         soft_min=5.0,
         soft_max=50.0,
-        update=lambda settings, _context: _refresh(settings),
-    )
-    redshift_color: bpy.props.FloatProperty(
-        name="Redshift Color",
-        description="How much the change of frequency changes colors: 0 not at all, 1 as physics has it",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        update=lambda settings, _context: _refresh(settings),
-    )
-    redshift_brightness: bpy.props.FloatProperty(
-        name="Redshift Brightness",
-        description="How much the change of frequency changes brightness: 0 not at all, 1 as physics has it",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        update=lambda settings, _context: _refresh(settings),
-    )
-    sky_temperature: bpy.props.FloatProperty(
-        name="Sky Temperature",
-        description="Temperature of the light, in kelvin, that the color shift assumes",
-        default=physics.DEFAULT_SKY_TEMPERATURE,
-        min=500.0,
-        soft_max=40000.0,
-        max=1e6,
-        step=10000,
         update=lambda settings, _context: _refresh(settings),
     )
     live_preview: bpy.props.BoolProperty(
@@ -129,26 +115,28 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples "
         "smooth the finest images of the sky beside it",
         items=(
-            ("1", "1 x 1", "One ray a pixel"),
-            ("2", "2 x 2", "Four rays a pixel"),
-            ("4", "4 x 4", "Sixteen rays a pixel"),
+            ("1", "1 x 1", "One ray per pixel", 0),
+            ("2", "2 x 2", "Four rays per pixel", 1),
+            ("4", "4 x 4", "Sixteen rays per pixel", 2),
         ),
         default="1",
         update=lambda settings, _context: _refresh(settings),
         options=set(),
     )
+    # Labeled Accuracy; the identifier is that of the first version.
     quality: bpy.props.EnumProperty(
         name="Accuracy",
         description="How exactly the map is made: the error of direction allowed",
         items=(
-            ("DRAFT", "Draft", "1e-4 radians, a tenth of a pixel or so: for trying things out"),
+            ("DRAFT", "Draft", "1e-4 radians, about a tenth of a pixel: for trying things out", 0),
             (
                 "STANDARD",
                 "Standard",
                 f"{physics.DEFAULT_INTERPOLATION:g} radians, a hundredth of a pixel or less: for final pictures",
+                1,
             ),
-            ("REFERENCE", "Reference", "Every pixel is traced, as exactly as the arithmetic allows: slow"),
-            ("CUSTOM", "Custom", "Tolerances of your own"),
+            ("REFERENCE", "Reference", "Every pixel is traced, as exactly as the arithmetic allows: slow", 2),
+            ("CUSTOM", "Custom", "Tolerances of your own", 3),
         ),
         default="STANDARD",
         options=set(),
@@ -189,8 +177,9 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
                 "WORLD",
                 "World",
                 "The Environment Texture of the scene's World, with its rotation and strength",
+                0,
             ),
-            ("IMAGE", "Image", "An equirectangular image chosen here"),
+            ("IMAGE", "Image", "An equirectangular image chosen here", 1),
         ),
         default="WORLD",
         update=lambda settings, _context: _refresh(settings),
@@ -209,6 +198,13 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         default=True,
         options=set(),
     )
+
+
+for _name in SKY_PROPERTIES:
+    UmbraSceneProperties.__annotations__[_name] = property_of(
+        physics.SKY_SETTINGS[_name], lambda settings, _context: _refresh(settings)
+    )
+saved_names.accept(UmbraSceneProperties, saved_names.SCENE)
 
 
 def _refresh(settings: UmbraSceneProperties) -> None:

@@ -16,7 +16,7 @@ else:
 
 
 class DiskSettings(_Group):
-    """What `UmbraDiskProperties` holds."""
+    """What `UmbraDiskProperties` holds; of the rows of `physics.DISK_SETTINGS`, those that code asks for by name."""
 
     enabled: bool
     inner_at_isco: bool
@@ -25,20 +25,6 @@ class DiskSettings(_Group):
     retrograde: bool
     crossings: int
     profile: str
-    exponent: float
-    temperature: float
-    doppler_color: float
-    doppler_brightness: float
-    beaming: str
-    color_variation: float
-    falloff: float
-    exposure: float
-    opacity: float
-    streaks: float
-    clumps: float
-    inner_softness: float
-    outer_softness: float
-    gain: float
     turning_speed: float
     texture: bpy.types.Image | None
     texture_use: str

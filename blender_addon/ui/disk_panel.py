@@ -8,14 +8,13 @@ from ..scene import frame_setup
 from ..settings import disk_properties
 from .sidebar import HolePanel, UmbraPanel
 
-# Identifiers as scripts write them -> names of `PRESETS`.
-PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in physics.DISK_PRESETS}
-_PRESET_TEXTS = {
-    "gargantua": ("Gargantua", "Thin, warm and even: the same brightness on both sides, as in the film"),
-    "physical": ("Physical", "All as physics has it, with the side that comes towards the camera far brighter"),
-    "blue hot": ("Blue Hot", "Young and hot, with a part of the Doppler effect"),
-    "ember": ("Ember", "Cool, clumpy and red"),
-}
+# Identifiers as scripts write them -> names of the presets.
+PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in physics.DISK_PRESET_TABLE}
+
+
+def _preset_items() -> tuple[tuple[str, str, str, int], ...]:
+    presets = {identifier: physics.DISK_PRESET_TABLE[name] for identifier, name in PRESET_NAMES.items()}
+    return tuple((identifier, each.label, each.description, each.number) for identifier, each in presets.items())
 
 
 class UMBRA_OT_disk_preset(bpy.types.Operator):
@@ -26,7 +25,7 @@ class UMBRA_OT_disk_preset(bpy.types.Operator):
 
     preset: bpy.props.EnumProperty(
         name="Look",
-        items=tuple((identifier, *_PRESET_TEXTS[name]) for identifier, name in PRESET_NAMES.items()),
+        items=_preset_items(),
         default=disk_properties.DEFAULT_LOOK.upper(),
     )
 

@@ -8,7 +8,7 @@ import dataclasses
 
 from ..files.disk_pass_file import read_disk_passes
 from ..geodesics.disk_tracer import DEFAULT_CROSSINGS
-from ..light.disk_look import PRESETS
+from ..light.disk_settings import DISK_SETTINGS, PRESETS, DiskLook
 from ..light.disk_texture import disk_texture
 from ..maps.warp_map import WarpMap
 from ..numerics.arrays import Array
@@ -37,8 +37,18 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how the disk looks."""
     parser.add_argument("--disk", action="store_true", help="draw the disk whose passes were baked beside the map")
     parser.add_argument("--disk-look", choices=tuple(PRESETS), default="physical", help="how the disk looks")
-    parser.add_argument("--disk-exposure", type=float, default=0.0, help="stops by which the disk is brightened")
     parser.add_argument("--disk-time", type=float, default=0.0, help="time at which it is seen, in M")
+    look = parser.add_argument_group("the disk's look", "in place of the values that --disk-look has")
+    for setting in DISK_SETTINGS.values():
+        added = "; added to the look's own value" if setting.is_added else ""
+        look.add_argument(
+            setting.option,
+            type=type(setting.default),
+            choices=[choice.value for choice in setting.choices] or None,
+            default=argparse.SUPPRESS,
+            metavar=None if setting.choices else "VALUE",
+            help=setting.sentence + added,
+        )
 
 
 def disk_of(options: argparse.Namespace) -> Disk | None:
@@ -60,8 +70,33 @@ def disk_of(options: argparse.Namespace) -> Disk | None:
 
 
 def draw_disk(options: argparse.Namespace, warp_map: WarpMap, sky: Array) -> Array:
-    """Return the picture, shape (height, width, 4), of the disk that the options of ``render`` ask for over a sky."""
-    look = PRESETS[options.disk_look]
-    look = dataclasses.replace(look, exposure=look.exposure + options.disk_exposure)
+    """Return the picture, shape (height, width, 4), of the disk that the options of ``render`` ask for over a sky.
+
+    Raises
+    ------
+    BlackHoleError
+        If a setting of the look is out of its range.
+    WarpMapError
+        If a pass is missing or damaged, or belongs to another map.
+    """
+    look = look_of(options)
     layers = disk_layers(read_disk_passes(options.map, warp_map), look, disk_texture(), options.disk_time)
     return over_sky(sky, *layers)
+
+
+def look_of(options: argparse.Namespace) -> DiskLook:
+    """Return the look that the options of ``render`` ask for.
+
+    Raises
+    ------
+    BlackHoleError
+        If a setting is out of its range.
+    """
+    look = PRESETS[options.disk_look]
+    changes = {name: value for name in DISK_SETTINGS if (value := getattr(options, f"disk_{name}", None)) is not None}
+    for name in changes:
+        if DISK_SETTINGS[name].is_added:
+            changes[name] += getattr(look, name)
+    look = dataclasses.replace(look, **changes)
+    look.validate()
+    return look

@@ -13,6 +13,7 @@ import numpy as np
 from ..files.warp_map_file import read_warp_map
 from ..images.exr import read_exr, write_exr
 from ..images.png import write_png
+from ..light.sky_settings import RENDER_ARGUMENTS, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
 from ..reference.reference_render import render
 from . import disk_command
@@ -34,15 +35,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rotation", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"), help="of the sky, degrees"
     )
-    parser.add_argument("--exposure", type=float, default=0.0, help="stops by which the sky is brightened")
-    parser.add_argument("--redshift-color", type=float, default=1.0, help="0 off, 1 physical")
+    for setting in SKY_SETTINGS.values():
+        parser.add_argument(setting.option, type=float, default=setting.default, metavar="VALUE", help=setting.sentence)
     # The British spelling, for command lines that have it.
     parser.add_argument(
         "--redshift-colour", dest="redshift_color", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS
     )
-    parser.add_argument("--redshift-brightness", type=float, default=1.0, help="0 off, 1 physical")
-    parser.add_argument("--temperature", type=float, default=6500.0, help="of the sky's light, kelvin")
     disk_command.add_render_options(parser)
+
+
+def sky_arguments(options: argparse.Namespace) -> dict[str, float]:
+    """Return how the sky looks by the options, as arguments of `reference_render.render`."""
+    values = {name: getattr(options, row.option[2:].replace("-", "_")) for name, row in SKY_SETTINGS.items()}
+    return {RENDER_ARGUMENTS[name]: value for name, value in values.items()}
 
 
 def run(options: argparse.Namespace) -> None:
@@ -76,10 +81,7 @@ def run(options: argparse.Namespace) -> None:
         warp_map,
         environment,
         rotation=[math.radians(angle) for angle in options.rotation],
-        color_amount=options.redshift_color,
-        brightness_amount=options.redshift_brightness,
-        temperature=options.temperature,
-        exposure=options.exposure,
+        **sky_arguments(options),
         output_size=(camera["width"], camera["height"]),
     )
     image = disk_command.draw_disk(options, warp_map, picture.image) if options.disk else picture.image

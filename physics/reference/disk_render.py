@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..disk_passes.disk_pass import DiskPass
-from ..light.disk_look import DiskLook, shade
+from ..light.disk_look import shade
+from ..light.disk_settings import DiskLook
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..shot.disk import Disk

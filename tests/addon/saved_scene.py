@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small scene that each release saves, for the releases after it to open; and the script that saves one.
 
-    python tests/addon/saved_scene.py CHECKOUT OUT.blend [--disk]
+    python tests/addon/saved_scene.py CHECKOUT OUT.blend [--disk] [--animated]
 
-with the Python that has Blender 4.5 (the oldest supported one, whose files all others open) builds the scene with the
-add-on as it stands in CHECKOUT, a folder with any commit of this repository, and saves it. Only what every version has
-is used here, by the names it was saved under.
+builds the scene with the add-on as it stands in CHECKOUT, a folder with any commit of this repository, and saves it.
+Use the Python that has Blender 4.5, the oldest supported one, whose files all others open. Blender 5 keeps values
+elsewhere, so there is a file of its own for that. Only what every version has is used here.
 """
 
 from __future__ import annotations
@@ -27,12 +27,28 @@ HOLE = {"spin": 0.75, "mass_scale": 0.5, "motion": "STATIC"}
 SCENE = {"environment_source": "IMAGE", "quality": "DRAFT", "supersampling": "2"}
 GROUP = {
     "Exposure": 0.5,
-    "Redshift Colour": 0.75,
+    "Redshift Color": 0.75,
     "Redshift Brightness": 0.5,
     "Sky Temperature": 5000.0,
     "Environment Strength": 1.5,
 }
 ROTATION = (0.1, 0.2, 0.3)
+
+
+# Frames and values of the keyframes of an animated scene.
+KEYFRAMES = {1: 0.25, 3: 0.75}
+WORLD_SCENE, LENS_SCENE = "With the Output World", "With the Output Cycles Lens"
+IN_STRIPS, FOLLOWER, UNUSED = "Hole in Strips", "Follower", "Unused Action"
+
+
+def property_of(settings: bpy.types.bpy_struct, name: str) -> str:
+    """A property's name in the version of the add-on that is enabled."""
+    return name if name in settings.bl_rna.properties else name.replace("color", "colour")
+
+
+def input_of(node: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
+    """A node's input by the name that the version of the add-on that is enabled has for it."""
+    return node.inputs.get(name) or node.inputs[name.replace("Color", "Colour")]
 
 
 def sky_pixels() -> np.ndarray:
@@ -58,7 +74,7 @@ def compositor_of(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     return scene.node_tree if bpy.app.version < (5, 0) else scene.compositing_node_group
 
 
-def build(*, disk: bool) -> bpy.types.Scene:
+def build(*, disk: bool, animated: bool = False) -> bpy.types.Scene:
     """Make the scene with whatever version of the add-on is enabled."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     for each in list(bpy.data.objects):
@@ -89,6 +105,9 @@ def build(*, disk: bool) -> bpy.types.Scene:
         hole.umbra.disk.temperature = 7000.0
         hole.umbra.disk.streaks = 0.25
     _finish_compositor(scene)
+    if animated:
+        _animate(scene)
+        _add_outputs(scene)
     return scene
 
 
@@ -97,7 +116,7 @@ def _finish_compositor(scene: bpy.types.Scene) -> None:
     tree = compositor_of(scene)
     group = next(node for node in tree.nodes if node.get("umbra_role") == "group")
     for name, value in GROUP.items():
-        group.inputs[name].default_value = value
+        input_of(group, name).default_value = value
     group.inputs["Environment Rotation"].default_value = ROTATION
     targets = [link.to_socket for link in group.outputs["Image"].links]
     own = tree.nodes.new("CompositorNodeExposure")
@@ -107,20 +126,90 @@ def _finish_compositor(scene: bpy.types.Scene) -> None:
         tree.links.new(own.outputs["Image"], target)
 
 
+def _insert_keyframes(owner: bpy.types.ID, settings: bpy.types.bpy_struct, name: str) -> None:
+    for frame, value in KEYFRAMES.items():
+        setattr(settings, name, value)
+        assert settings.keyframe_insert(name, frame=frame)
+    assert owner.animation_data.action_slot is not None
+
+
+def _drive(owner: bpy.types.bpy_struct, name: str, source: bpy.types.ID, path: str, index: int = -1) -> None:
+    driver = owner.driver_add(name, index).driver
+    driver.type = "SUM"
+    target = driver.variables.new().targets[0]
+    target.id_type = source.id_type
+    target.id, target.data_path = source, path
+
+
+def _animate(scene: bpy.types.Scene) -> None:
+    """Give keyframes, strips and drivers to everything that has another name today."""
+    hole = scene.umbra.active_hole
+    disk = hole.umbra.disk
+    disk.texture_use = disk.bl_rna.properties["texture_use"].enum_items[1].identifier
+    scene.frame_start, scene.frame_end = min(KEYFRAMES), max(KEYFRAMES)
+    redshift = property_of(scene.umbra, "redshift_color")
+    doppler, variation = property_of(disk, "doppler_color"), property_of(disk, "color_variation")
+    _insert_keyframes(scene, scene.umbra, redshift)
+    _insert_keyframes(hole, disk, doppler)
+    _drive(disk, variation, scene, f"umbra.{redshift}")
+    (group,) = [node for node in compositor_of(scene).nodes if node.get("umbra_role") == "group"]
+    _drive(input_of(group, "Redshift Color"), "default_value", scene, f"umbra.{redshift}")
+
+    unused = hole.animation_data.action.copy()
+    unused.name, unused.use_fake_user = UNUSED, True
+    other = bpy.data.objects.new(IN_STRIPS, None)
+    scene.collection.objects.link(other)
+    _insert_keyframes(other, other.umbra.disk, doppler)
+    animation = other.animation_data
+    strip = animation.nla_tracks.new().strips.new("Strip", 1, animation.action)
+    strip.action_slot = animation.action_slot
+    animation.action = None
+
+
+def _add_outputs(scene: bpy.types.Scene) -> None:
+    """Scenes with the other outputs, and an object that follows the World's group by name and by index."""
+    hole = scene.umbra.active_hole
+    disk = hole.umbra.disk
+    for name, output in ((WORLD_SCENE, "WORLD"), (LENS_SCENE, "CYCLES_LENS")):
+        other = scene.copy()
+        other.name, other.use_fake_user = name, True
+        other.animation_data_clear()
+        if bpy.app.version >= (5, 0):
+            other.compositing_node_group = scene.compositing_node_group.copy()
+        camera = scene.camera.copy()
+        camera.data = scene.camera.data.copy()
+        other.collection.objects.link(camera)
+        other.camera = camera
+        other.umbra.output = output
+        assert other.umbra.output == output
+    tree = bpy.data.scenes[WORLD_SCENE].world.node_tree
+    (node,) = [each for each in tree.nodes if each.type == "GROUP"]
+    socket = input_of(node, "Redshift Color")
+    for frame, value in KEYFRAMES.items():
+        socket.default_value = value
+        assert socket.keyframe_insert("default_value", frame=frame)
+    follower = bpy.data.objects.new(FOLLOWER, None)
+    bpy.data.scenes[WORLD_SCENE].collection.objects.link(follower)
+    by_name = f'node_tree.nodes["{node.name}"].inputs["{socket.name}"].default_value'
+    world = bpy.data.scenes[WORLD_SCENE].world
+    _drive(follower, "location", hole, f"umbra.disk.{property_of(disk, 'doppler_color')}", 0)
+    _drive(follower, "location", world, by_name, 1)
+    _drive(follower, "location", world, f"node_tree.{socket.path_from_id('default_value')}", 2)
+
+
 def main() -> None:
     """Build and save the scene."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("checkout", type=Path)
     parser.add_argument("output", type=Path)
     parser.add_argument("--disk", action="store_true")
+    parser.add_argument("--animated", action="store_true")
     options = parser.parse_args()
-    if bpy.app.version >= (5, 0):
-        sys.exit("Save it with Blender 4.5: newer versions write files that it cannot open.")
     sys.path.insert(0, str(options.checkout.resolve()))
     import blender_addon
 
     blender_addon.register()
-    build(disk=options.disk)
+    build(disk=options.disk, animated=options.animated)
     bpy.context.preferences.filepaths.save_version = 0
     with tempfile.TemporaryDirectory() as folder:  # a file keeps the path that it is saved to
         path = Path(folder) / options.output.name

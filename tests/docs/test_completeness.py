@@ -6,6 +6,7 @@ import ast
 
 from pages import DOCS, ROOT
 
+import physics
 from physics.cli import make_parser
 
 ADDON = sorted((ROOT / "blender_addon").rglob("*.py"))
@@ -40,6 +41,8 @@ def properties():
                 for label in (named or node.annotation.args)[:1]:
                     if isinstance(label, ast.Constant) and node.target.id not in UNSEEN:
                         yield f"{file.stem}.{node.target.id}", label.value
+    for name, setting in (physics.DISK_SETTINGS | physics.SKY_SETTINGS).items():
+        yield f"tables.{name}", setting.label
 
 
 def test_settings_are_described():
@@ -66,5 +69,5 @@ def test_operators_are_described():
 def test_what_is_looked_for_is_found():
     assert ("bake", "`--spin") in list(command_line_options())
     assert ("hole_properties.spin", "Spin") in list(properties())
-    assert ("disk_properties.opacity", "Opacity") in list(properties())
+    assert ("tables.opacity", "Opacity") in list(properties())
     assert ("umbra.bake_frame", "Bake This Frame") in list(operators())

@@ -26,7 +26,8 @@ from physics.geodesics.tracer import trace_block
 from physics.kerr.metric import check_spin, ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
 from physics.kerr.rays import rays_from_triad
 from physics.light.color import redshift_gain
-from physics.light.disk_look import DiskLook, shade
+from physics.light.disk_look import shade
+from physics.light.disk_settings import DiskLook
 from physics.light.disk_texture import disk_texture
 from physics.numerics.sphere import celestial_coordinates, spherical_triad
 

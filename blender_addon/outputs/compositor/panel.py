@@ -5,9 +5,9 @@ import bpy
 
 from ..shared.compositor_tree import find_setup
 from ..shared.drawing import draw_inputs, draw_problem, draw_sky_choice
-from ..shared.look import PLACEMENT, SHARED
+from ..shared.look import EXPOSURE, PLACEMENT, SHARED
 
-LOOK_CONTROLS = ("Exposure", *SHARED.values())
+LOOK_CONTROLS = (EXPOSURE, *SHARED.values())
 PLACEMENT_CONTROLS = tuple(PLACEMENT.values())
 
 

@@ -19,7 +19,7 @@ from .compositor_tree import ROLE, find_node, find_tree
 from .map_images import read_sequence
 
 DISK = "disk"
-TABLE_ROLES = {disk_group.COLORS: "disk_colors", disk_group.TEXTURE: "disk_texture"}
+PICTURE_ROLES = {name: picture.role for name, picture in disk_images.PICTURES.items()}
 # Nodes that only files have whose group was of version 1.
 FORMER_ROLES = ("disk_profile",)
 
@@ -121,8 +121,8 @@ def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.N
             tree.links.new(picture, node.inputs[disk_group.BEHIND])
         disk_group.remove_unused()
     node.name = node.label = disk_group.GROUP_NAME
-    roles = (*(pass_role(number) for number in range(1, images + 1)), *TABLE_ROLES.values())
-    for role, name in zip(roles, (*disk_group.pass_names(images), *TABLE_ROLES), strict=True):
+    roles = (*(pass_role(number) for number in range(1, images + 1)), *PICTURE_ROLES.values())
+    for role, name in zip(roles, (*disk_group.pass_names(images), *PICTURE_ROLES), strict=True):
         image = find_node(tree, role)
         if image is None:
             image = tree.nodes.new("CompositorNodeImage")
@@ -136,7 +136,7 @@ def ensure_node(scene: bpy.types.Scene, tree: bpy.types.NodeTree) -> bpy.types.N
 
 def arrange(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
     """Lay the disk's pictures out beside its node."""
-    roles = (*(pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1)), *TABLE_ROLES.values())
+    roles = (*(pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1)), *PICTURE_ROLES.values())
     images = [image for image in (find_node(tree, role) for role in roles) if image is not None]
     for index, image in enumerate(images):
         image.location = (node.location.x - 300, node.location.y - 340 * (index + 1))
@@ -150,7 +150,7 @@ def remove(tree: bpy.types.NodeTree) -> None:
         tree.nodes.remove(node)
         disk_group.remove_unused()
     passes = (pass_role(number) for number in range(1, physics.MOST_CROSSINGS + 1))
-    for role in (*passes, *TABLE_ROLES.values(), *FORMER_ROLES):
+    for role in (*passes, *PICTURE_ROLES.values(), *FORMER_ROLES):
         _remove_node(tree, role)
     disk_images.remove_unused()
 
@@ -203,19 +203,14 @@ def _follow_geometry(
 def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object) -> None:
     settings = hole.umbra.disk
     animated = animated_paths(hole)
-    for field, name in disk_group.LOOK_SOCKETS.items():
-        path = f"umbra.disk.{field}"
-        _follow(tree, node.inputs[name], getattr(settings, field), hole, path if path in animated else None)
-    node.inputs[disk_group.BEAMING].default_value = disk_properties.BEAMINGS[settings.beaming]
-    node.inputs[disk_group.PAGE_THORNE].default_value = float(settings.profile != "power_law")
-    images = {
-        disk_group.COLORS: disk_images.ensure_colors(),
-        disk_group.TEXTURE: settings.texture or disk_images.ensure_texture(),
-    }
-    for name, image in images.items():
-        table = find_node(tree, TABLE_ROLES[name])
-        if table is not None and table.image != image:
-            table.image = image
+    for name, setting in physics.DISK_SETTINGS.items():
+        path = f"umbra.disk.{name}"
+        value = setting.socket_value(disk_properties.value_of(settings, name))
+        _follow(tree, node.inputs[setting.socket], value, hole, path if path in animated else None)
+    for picture in disk_images.PICTURES.values():
+        reader, image = find_node(tree, picture.role), picture.image(settings)
+        if reader is not None and reader.image != image:
+            reader.image = image
 
 
 def _follow_time(

@@ -8,18 +8,18 @@ from typing import Any
 
 import bpy
 
+from ...core.physics_api import physics
+from ...settings.scene_properties import SKY_PROPERTIES
+
 # The scene's settings and the group's sockets that say the same.
-SHARED = {
-    "redshift_color": "Redshift Color",
-    "redshift_brightness": "Redshift Brightness",
-    "sky_temperature": "Sky Temperature",
-}
+SHARED = {name: physics.SKY_SETTINGS[name].socket for name in SKY_PROPERTIES}
+EXPOSURE = physics.SKY_SETTINGS["exposure"].socket
 
 # What the image of a lensed World is placed by, and the sockets of the compositor's group that say the same.
 PLACEMENT = {"Rotation": "Environment Rotation", "Strength": "Environment Strength"}
 
 # All that several outputs know.
-CARRIED = ("Exposure", *PLACEMENT.values(), *SHARED.values())
+CARRIED = (EXPOSURE, *PLACEMENT.values(), *SHARED.values())
 
 
 def look_of_scene(scene: bpy.types.Scene) -> dict[str, Any]:

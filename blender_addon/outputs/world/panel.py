@@ -5,10 +5,10 @@ import bpy
 
 from ...nodes import world_group, world_nodes
 from ..shared.drawing import draw_inputs, draw_problem, draw_sky_choice
-from ..shared.look import SHARED
+from ..shared.look import EXPOSURE, SHARED
 from . import lensed_world
 
-CONTROLS = ("Exposure", *SHARED.values())
+CONTROLS = (EXPOSURE, *SHARED.values())
 
 
 def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -12,7 +12,8 @@ from physics import BlackHoleError, Disk, Observer, bake, trace_disk
 from physics.kerr.metric import isco_radius
 from physics.kerr.orbiting_matter import circular_constants, orbital_frequency
 from physics.light.disk_flux import page_thorne_flux, peak_radius, relative_flux
-from physics.light.disk_look import PRESETS, DiskLook, emission, shade
+from physics.light.disk_look import emission, shade
+from physics.light.disk_settings import PRESETS, DiskLook
 from physics.light.disk_texture import (
     SHEAR_TURNS,
     disk_texture,

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The table of how the sky looks: one row for each setting.
+
+The options of ``python -m physics render``, the properties of `scene.umbra`, the sockets of the node groups and the
+table in the manual (`docs/settings_tables.py`) are made from it.
+"""
+
+from __future__ import annotations
+
+from .color import DEFAULT_TEMPERATURE
+from .settings import Setting
+
+SKY_SETTINGS: dict[str, Setting] = {
+    "exposure": Setting(
+        "Exposure",
+        "Brightens the sky by this many stops, without changing the rendered scene",
+        0.0,
+        -32.0,
+        32.0,
+        unit="stops",
+        socket="Exposure",
+        option="--exposure",
+    ),
+    "redshift_color": Setting(
+        "Redshift Color",
+        "How much the frequency shift changes the color of the sky: 0 is not at all, 1 is physically accurate",
+        1.0,
+        0.0,
+        1.0,
+        subtype="FACTOR",
+        socket="Redshift Color",
+        option="--redshift-color",
+    ),
+    "redshift_brightness": Setting(
+        "Redshift Brightness",
+        "How much the frequency shift changes the brightness of the sky: 0 is not at all, 1 is physically accurate, "
+        "(1 + z) to the power of -4",
+        1.0,
+        0.0,
+        1.0,
+        subtype="FACTOR",
+        socket="Redshift Brightness",
+        option="--redshift-brightness",
+    ),
+    "sky_temperature": Setting(
+        "Sky Temperature",
+        "Color temperature of the sky's light, from which the shift of its color is computed",
+        DEFAULT_TEMPERATURE,
+        500.0,
+        1e6,
+        soft_high=40_000.0,
+        step=100.0,
+        unit="K",
+        subtype="COLOR_TEMPERATURE",
+        socket="Sky Temperature",
+        option="--temperature",
+    ),
+}
+"""Name -> row; all but the exposure are also properties of `scene.umbra`."""
+
+RENDER_ARGUMENTS = {
+    "exposure": "exposure",
+    "redshift_color": "color_amount",
+    "redshift_brightness": "brightness_amount",
+    "sky_temperature": "temperature",
+}
+"""Name in `SKY_SETTINGS` -> argument of `reference_render.render`."""
