@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Self, TypeAlias
 import bpy
 
 if TYPE_CHECKING:
-    from typing import overload
+    from typing import overload as overload
 else:
 
     def overload(function: object) -> object:
