@@ -7,8 +7,8 @@ import bpy
 SCENE_OWNS_COMPOSITOR = bpy.app.version < (5, 0)
 # Before 5.0 Worlds and materials have a switch for their nodes; since then they always use them.
 NODES_ARE_OPTIONAL = bpy.app.version < (5, 0)
-# Since 5.0 interpolation and extension of Map UV are sockets.
-MAP_UV_HAS_MENUS = bpy.app.version >= (5, 0)
+# Since 5.0 most settings of compositor nodes are sockets.
+COMPOSITOR_SETTINGS_ARE_SOCKETS = bpy.app.version >= (5, 0)
 # Before 5.0 the values of registered properties are custom properties of the same name; since then they lie apart.
 PROPERTIES_ARE_APART = bpy.app.version >= (5, 0)
 # Since 5.2 Cycles counts the rows of a texture in OSL from the bottom.

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from .arithmetic import clamp, combine, floor, maximum, mix, multiply_add
 from .builder import Float, Number, Vector
-from .image_nodes import SETTINGS_ARE_SOCKETS, image_size, map_uv, separate_color
+from .image_nodes import image_size, map_uv, separate_color
 
 
 def sample_bilinearly(picture: Vector, u: Number, v: Float) -> Vector:
@@ -25,7 +26,7 @@ def sample_bilinearly(picture: Vector, u: Number, v: Float) -> Vector:
     Vector
         The color; Blender 5.x keeps the alpha as well.
     """
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         return map_uv(picture, combine(u, v, 1.0), "Bilinear")
 
     # Blender 4.5 has no usable bilinear look-up (its anisotropic one draws a line at the seam): four exact
@@ -54,7 +55,7 @@ def sample_bilinearly(picture: Vector, u: Number, v: Float) -> Vector:
 
 def sample_with_alpha(picture: Vector, u: Float, v: Float) -> tuple[Vector, Float]:
     """Color and alpha of a picture at texture coordinates, as `sample_bilinearly`."""
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         color = sample_bilinearly(picture, u, v)
         return color, separate_color(color)[3]
     _, _, _, alpha = separate_color(picture)

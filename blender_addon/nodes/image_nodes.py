@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from .builder import Float, Number, TreeBuilder, Vector
-
-SETTINGS_ARE_SOCKETS = bpy.app.version >= (5, 0, 0)
-"""From 5.0 on, settings of compositor nodes are menu sockets; before, they were properties of the node."""
 
 
 def separate_color(color: Vector) -> tuple[Float, Float, Float, Float]:
@@ -70,7 +68,7 @@ def map_uv(image: Vector, uv: Vector, interpolation: str) -> Vector:
     """
     builder = image.builder
     node = builder.node("CompositorNodeMapUV")
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         node.inputs["Interpolation"].default_value = interpolation
         node.inputs["Extension X"].default_value = "Repeat"
         node.inputs["Extension Y"].default_value = "Extend"
@@ -86,7 +84,7 @@ def map_uv(image: Vector, uv: Vector, interpolation: str) -> Vector:
 def scale_by(image: Vector, factor: Float) -> Vector:
     """Scale an image about its center by one factor for both axes, taking nearest pixels."""
     node = _resampling_node(image, "CompositorNodeScale", "Nearest")
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         node.inputs["Type"].default_value = "Relative"
     else:
         node.space = "RELATIVE"
@@ -98,7 +96,7 @@ def scale_by(image: Vector, factor: Float) -> Vector:
 def scale_to_render(image: Vector, interpolation: str) -> Vector:
     """Stretch an image over the render's area."""
     node = _resampling_node(image, "CompositorNodeScale", interpolation)
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         node.inputs["Type"].default_value = "Render Size"
         node.inputs["Frame Type"].default_value = "Stretch"
     else:
@@ -118,7 +116,7 @@ def translate(image: Vector, x: Float, y: Float, interpolation: str) -> Vector:
 def _resampling_node(image: Vector, kind: str, interpolation: str) -> bpy.types.Node:
     node = image.builder.node(kind)
     image.builder.feed(node.inputs["Image"], image)
-    if SETTINGS_ARE_SOCKETS:
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         node.inputs["Interpolation"].default_value = interpolation
         node.inputs["Extension X"].default_value = "Extend"
         node.inputs["Extension Y"].default_value = "Extend"

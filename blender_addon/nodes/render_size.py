@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from itertools import product
 
+from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from ..core.physics_api import physics
 from .arithmetic import multiply_add, where
 from .builder import Float, TreeBuilder, Vector
-from .image_nodes import SETTINGS_ARE_SOCKETS, image_size, render_area, scale_by, scale_to_render, translate
+from .image_nodes import image_size, render_area, scale_by, scale_to_render, translate
 
 _HALVINGS = 2
 """Two halvings and the last step by 2 reduce exactly up to 8:1: a map of 4x supersampling at half size."""
@@ -53,7 +54,7 @@ def to_render_size(builder: TreeBuilder, *images: Vector) -> tuple[Vector, ...]:
     double = width.near(2.0 * area_width, 0.1) * height.near(2.0 * area_height, 0.1)
     double.labeled("Exactly twice?")
     centering = _centering(width, area_width), _centering(height, area_height)
-    coverage = None if SETTINGS_ARE_SOCKETS else _coverage(images[-1], area, centering)
+    coverage = None if COMPOSITOR_SETTINGS_ARE_SOCKETS else _coverage(images[-1], area, centering)
     return tuple(_last_step(image, area, double, centering, coverage) for image in images)
 
 

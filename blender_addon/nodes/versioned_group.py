@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 import bpy
 
+from ..core.blender_version import SCENE_OWNS_COMPOSITOR, SERIES
 from ..core.physics_api import physics
 from .builder import TreeBuilder
-from .image_nodes import SETTINGS_ARE_SOCKETS
 
 BLENDER_KEY = "umbra_built_with_blender"
 CONTENT_KEY = "umbra_content"
@@ -85,7 +85,7 @@ class VersionedGroup:
         """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
         return bool(
             tree.get(self.version_key) == self.version
-            and tree.get(BLENDER_KEY) == _blender_series()
+            and tree.get(BLENDER_KEY) == SERIES
             and tree.get(CONTENT_KEY) == _fingerprint(tree)
         )
 
@@ -134,7 +134,7 @@ class VersionedGroup:
         for spec in self.outputs:
             builder.feed(targets[spec.name], results[spec.name])
         tree[self.version_key] = self.version
-        tree[BLENDER_KEY] = _blender_series()
+        tree[BLENDER_KEY] = SERIES
         tree[CONTENT_KEY] = _fingerprint(tree)
 
     def _match_interface(self, tree: bpy.types.NodeTree) -> list[SocketSpec]:
@@ -164,15 +164,10 @@ class VersionedGroup:
         return [spec for spec in added if spec.in_out == "INPUT"]
 
 
-def _blender_series() -> str:
-    """Version up to the minor number: each stores nodes differently, and Blender converts old files upward only."""
-    return f"{bpy.app.version[0]}.{bpy.app.version[1]}"
-
-
 def _set_default_in_users(tree: bpy.types.NodeTree, spec: SocketSpec) -> None:
     """Give a new input its default in existing group nodes; Blender added it to them before it had one."""
     users = [*bpy.data.node_groups, *(world.node_tree for world in bpy.data.worlds if world.node_tree is not None)]
-    if not SETTINGS_ARE_SOCKETS:
+    if SCENE_OWNS_COMPOSITOR:
         users.extend(scene.node_tree for scene in bpy.data.scenes if scene.node_tree is not None)
     for user in users:
         for node in user.nodes:

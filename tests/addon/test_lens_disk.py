@@ -62,7 +62,9 @@ def expected_picture(
     period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
     light, through = modules.physics.disk_layers(passes, look, texture, time, period)
     size = behind.shape[1], behind.shape[0]
-    return modules.physics.disk_over_sky(behind, light, through), modules.reference_render.resize(light, size)
+    return modules.physics.disk_over_sky(behind, light, through), modules.physics.reference.reference_render.resize(
+        light, size
+    )
 
 
 def assert_same(picture: np.ndarray, expected: np.ndarray, light: np.ndarray) -> None:

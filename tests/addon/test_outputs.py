@@ -28,7 +28,7 @@ def flat(addon_module: Callable[[str], ModuleType]) -> Iterator[object]:
 
         def check(self, scene: bpy.types.Scene) -> None:
             if self.refuses:
-                raise errors.SceneError("Not here: choose another output.")
+                raise errors.SceneError("Not here: choose another output.", code="scene.flat")
 
         def install(self, scene: bpy.types.Scene, look: dict[str, object]) -> list[str]:
             scene["flat_before"] = scene.world
@@ -36,7 +36,7 @@ def flat(addon_module: Callable[[str], ModuleType]) -> Iterator[object]:
             if bpy.app.version < (5, 0):
                 scene.world.use_nodes = True
             if self.fails:
-                raise errors.SceneError("It went wrong half-way.")
+                raise errors.SceneError("It went wrong half-way.", code="scene.flat")
             return ["The sky is flat now."]
 
         def remove(self, scene: bpy.types.Scene) -> None:
@@ -127,7 +127,7 @@ def test_a_lens_without_its_shader_is_refused_before_anything_changes(
     errors = addon_module("core.errors")
 
     def no_shader(**_variant: bool) -> None:
-        raise errors.SceneError("This Blender was built without Open Shading Language.")
+        raise errors.SceneError("This Blender was built without Open Shading Language.", code="lens.none")
 
     monkeypatch.setattr(addon_module("outputs.lens.lens_shader"), "bytecode", no_shader)
     add_hole(scene)

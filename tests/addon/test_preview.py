@@ -89,8 +89,8 @@ def expected(scene: bpy.types.Scene, physics: ModuleType, addon_module) -> np.nd
     """The map as numpy makes it for where the camera is now."""
     frame = addon_module("outputs.frames").read(scene, bpy.context.evaluated_depsgraph_get(), np.zeros(3))
     draft = replace(frame.parameters, tolerance=1e-4)
-    world_map = physics.world_map
-    steps = world_map.world_map_steps(world_map.world_parameters(draft, world_map.PREVIEW))
+    api = physics.physics
+    steps = api.bake_world_map_steps(api.world_map_parameters(draft, api.WORLD_MAP_PREVIEW_GRID))
     while True:
         try:
             next(steps)
@@ -159,7 +159,7 @@ def test_a_slice_of_work_ends_with_its_budget(scene, preview) -> None:
 
 @pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
 def test_a_hundred_changes_leave_no_images_behind(scene, preview, physics, engine, monkeypatch) -> None:
-    monkeypatch.setattr(physics.world_map, "PREVIEW", (16, 15))
+    monkeypatch.setattr(physics.physics, "WORLD_MAP_PREVIEW_GRID", (16, 15))
     monkeypatch.setattr(preview.thumbnail, "SIDE", 16)
     if engine == "EEVEE":
         scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
