@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What differs between the supported versions of Blender. Nothing else asks for the version."""
+"""What differs between the supported versions of Blender.
+
+Nothing else asks for the version but the farm's script, which runs alone.
+"""
 
 import bpy
 

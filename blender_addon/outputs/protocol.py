@@ -2,8 +2,8 @@
 """The protocol of outputs: what the rest of the add-on may ask of a way to show the black hole.
 
 An output is one object for all scenes; what it knows of a scene lies in the scene. A new output is a subclass of
-`Output` that is added to the registry. The methods that raise `NotImplementedError` must be written; the others do
-what suits an output that shows baked maps and nothing else.
+`Output` with a line in `registration`, and one in the contracts of pyproject.toml. The methods that raise
+`NotImplementedError` must be written; the others do what suits an output that shows baked maps and nothing else.
 """
 
 from collections.abc import Generator

@@ -23,7 +23,7 @@ from ..shot.map_parameters import (
     looking_at_hole,
     unstable_orbit_warning,
 )
-from . import disk_command
+from . import disk_options
 from .progress import ProgressPrinter
 
 NAME = "bake"
@@ -54,7 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="error of direction between traced rays, radians; 0 traces every pixel",
     )
     parser.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
-    disk_command.add_bake_options(parser)
+    disk_options.add_bake_options(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> None:
         tolerance=options.tolerance,
         method=options.method,
         interpolation=options.interpolation,
-        disk=disk_command.disk_of(options),
+        disk=disk_options.disk_of(options),
     )
     parameters.validate()
     warning = unstable_orbit_warning(parameters)

@@ -16,7 +16,7 @@ from ..images.png import write_png
 from ..light.sky_settings import RENDER_ARGUMENTS, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
 from ..reference.reference_render import render
-from . import disk_command
+from . import disk_options
 
 NAME = "render"
 HELP = "make the picture of a warp map over an equirectangular sky"
@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--redshift-colour", dest="redshift_color", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS
     )
-    disk_command.add_render_options(parser)
+    disk_options.add_render_options(parser)
 
 
 def sky_arguments(options: argparse.Namespace) -> dict[str, float]:
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> None:
         **sky_arguments(options),
         output_size=(camera["width"], camera["height"]),
     )
-    image = disk_command.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
+    image = disk_options.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
     if options.output.suffix.lower() == ".png":
         write_png(options.output, image)
     else:

@@ -11,7 +11,7 @@ from ..kerr.rays import redshift_vector
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import spherical_triad
-from ..shot.cameras import Camera, PanoramaCamera
+from ..shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
 from ..shot.map_parameters import Vector, WarpMapParameters
 
 # The sphere around the hole that backward rays leave along their asymptotes, units of M.
@@ -75,10 +75,15 @@ def _plane(camera: Camera) -> tuple[Vector, Vector]:
     if isinstance(camera, PanoramaCamera):
         corner = (camera.longitude_min, camera.latitude_min, 0.0)
         far = (camera.longitude_max, camera.latitude_max)
-    else:
+    elif isinstance(camera, PerspectiveCamera):
         low, high = camera.directions([0.0, camera.width], [camera.height, 0.0])
         corner = (-low[0] / low[2], -low[1] / low[2], 0.0)
         far = (-high[0] / high[2], -high[1] / high[2])
+    else:
+        raise BlackHoleError(
+            f"The lens has no formula for a {camera.kind} camera; give it a perspective or panorama camera.",
+            code="camera.type",
+        )
     corner = _vector(np.array(corner))
     return corner, _vector(np.array([far[0] - corner[0], far[1] - corner[1], 0.0]))
 

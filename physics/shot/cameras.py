@@ -268,4 +268,6 @@ class PanoramaCamera:
         return longitude, latitude
 
 
+# A new camera has its place in both.
 Camera = PerspectiveCamera | PanoramaCamera
+CAMERAS: dict[str, type[Camera]] = {each.kind: each for each in (PerspectiveCamera, PanoramaCamera)}

@@ -18,7 +18,7 @@ from ..kerr.observer import Observer
 from ..numerics.checks import number, shown, three, vector, whole
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import spherical_triad
-from .cameras import Camera, PanoramaCamera, PerspectiveCamera
+from .cameras import CAMERAS, Camera
 from .disk import Disk
 
 Vector = tuple[float, float, float]
@@ -91,7 +91,7 @@ class WarpMapParameters:
             rows = tuple(vector(row, f"the matrix {name}") for row in three(getattr(self, name), f"the matrix {name}"))
             object.__setattr__(self, name, rows)
         object.__setattr__(self, "supersampling", whole(self.supersampling, "the supersampling"))
-        if not isinstance(self.camera, PerspectiveCamera | PanoramaCamera):
+        if not isinstance(self.camera, Camera):
             raise BlackHoleError(
                 f"The camera is {shown(self.camera)}; give a PerspectiveCamera or a PanoramaCamera.",
                 code="settings.type",
@@ -203,7 +203,7 @@ class WarpMapParameters:
     def from_metadata(cls, values: dict[str, Any]) -> WarpMapParameters:
         """Return the parameters that `to_metadata` was made from."""
         camera = dict(values["camera"])
-        kind = {"perspective": PerspectiveCamera, "panorama": PanoramaCamera}[camera.pop("kind")]
+        kind = CAMERAS[camera.pop("kind")]
         disk = Disk(**values["disk"]) if values.get("disk") else None
         return cls(**{**values, "camera": kind(**camera), "disk": disk})
 

@@ -310,4 +310,4 @@ def test_a_sky_of_the_artists_own_nodes_stays(
     assert origin(setup.group.inputs["Environment"])[0] == color
     scene.umbra.environment_image = None
     addon_module("outputs.compositor.compositor_sync").sync_sky(scene)  # nothing is missing
-    assert addon_module("ui.status").sky_problem(scene) is None
+    assert addon_module("outputs.registry").of(scene).sky_problem(scene) is None

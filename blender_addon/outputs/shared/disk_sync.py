@@ -216,7 +216,7 @@ def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.t
 def _follow_time(
     tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.types.Object, scene: bpy.types.Scene
 ) -> None:
-    """Let phase and turns of the patterns follow the frame; see `physics.disk_texture.pattern_shares`."""
+    """Let phase and turns of the patterns follow the frame; see `physics.disk_pattern_shares`."""
     settings = hole.umbra.disk
     period = disk_animation.pattern_period(scene, hole)
     _set(tree, node.inputs[disk_group.PERIOD], period)
