@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from small_scene import add_hole, environment_pixels, render, run_python, shrink
 
+from physics.reference import reference_render
+
 LIGHT = 2e-3
 TYPICAL = 2e-5
 
@@ -65,7 +67,7 @@ def expected_picture(
     light, through = modules.physics.disk_layers(passes, look, texture, time, period)
     sky = modules.physics.render_reference(physics.read_warp_map(path), environment_pixels(), output_size=size).image
     picture = modules.physics.disk_over_sky(sky, light, through)
-    return picture, modules.reference_render.resize(light, size)
+    return picture, reference_render.resize(light, size)
 
 
 def assert_same(picture: np.ndarray, expected: np.ndarray, light: np.ndarray) -> None:
@@ -256,12 +258,12 @@ def test_one_period_holds_for_all_frames(
     for frame, spin in ((1, 0.2), (5, 0.9)):
         hole.umbra.spin = spin
         hole.keyframe_insert("umbra.spin", frame=frame)
-    texture, period_of = modules.disk_texture, addon_module("scene.disk_animation").pattern_period
+    period_of = addon_module("scene.disk_animation").pattern_period
     disk = addon_module("settings.disk_properties").disk_of(hole.umbra.disk)
     for frame in (1, 4):
         scene.frame_set(frame)
         spins = [addon_module("scene.disk_animation").value_at(hole, "umbra.spin", each) for each in range(1, 6)]
-        expected = min(texture.pattern_period(spin, *disk.radii(spin)) for spin in spins)
+        expected = min(modules.physics.disk_pattern_period(spin, *disk.radii(spin)) for spin in spins)
         assert period_of(scene, hole) == pytest.approx(expected)
 
 

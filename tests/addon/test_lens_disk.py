@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from small_scene import compositor, links_of, render, run_python, shrink
 
+from physics.reference import reference_render
+
 LIGHT = 2e-3
 TYPICAL = 2e-5
 
@@ -62,7 +64,7 @@ def expected_picture(
     period = addon_module("scene.disk_animation").pattern_period(scene, scene.umbra.active_hole)
     light, through = modules.physics.disk_layers(passes, look, texture, time, period)
     size = behind.shape[1], behind.shape[0]
-    return modules.physics.disk_over_sky(behind, light, through), modules.reference_render.resize(light, size)
+    return modules.physics.disk_over_sky(behind, light, through), reference_render.resize(light, size)
 
 
 def assert_same(picture: np.ndarray, expected: np.ndarray, light: np.ndarray) -> None:
