@@ -130,7 +130,7 @@ def operand(socket: bpy.types.NodeSocket, places: Places) -> str:
 def text_of(value: object) -> str:
     """Write a value; a float as the shortest text that gives the same float32."""
     if isinstance(value, float):
-        return str(np.float32(value))
+        return str(float(str(np.float32(value))))  # versions of numpy write large numbers differently
     if value is None or isinstance(value, str | bool | int):
         return str(value)
     return "(" + ", ".join(map(text_of, value)) + ")"
