@@ -50,7 +50,7 @@ INNERMOST, FLUX_FACTOR = "Innermost Orbit", "Flux Factor"
 
 _BEHIND = _picture(BEHIND, "What is behind the disk, of the render's size")
 _INPUTS = (
-    *(_picture(name, picture.description) for name, picture in disk_images.PICTURES.items()),
+    *(_picture(each.socket, each.description) for each in disk_images.PICTURES.values()),
     _number(PHASE, "How far the pattern of the streaks is through its life, 0 to 1", 0.0, 0.0, 1.0),
     _number(FIRST_TURN, "Angle by which the first pattern is turned, radians", 0.0),
     _number(SECOND_TURN, "Angle by which the second pattern is turned, radians", 0.0),
@@ -162,8 +162,6 @@ def owns(tree: bpy.types.NodeTree | None) -> bool:
 def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
     return disk_nodes.DiskInputs(
         disk_pass=values[PASS],
-        colors=values["Colors"],
-        texture=values["Texture"],
         phase=values[PHASE],
         first_turn=values[FIRST_TURN],
         second_turn=values[SECOND_TURN],
@@ -174,5 +172,6 @@ def _disk_inputs(values: Values) -> disk_nodes.DiskInputs:
         outer=values[OUTER],
         innermost=values[INNERMOST],
         flux_factor=values[FLUX_FACTOR],
+        **{field: values[picture.socket] for field, picture in disk_images.PICTURES.items()},
         **{field: values[name] for field, name in LOOK_SOCKETS.items()},
     )

@@ -139,8 +139,9 @@ def remove_unused() -> None:
 class Picture:
     """A picture that the node group looks up."""
 
+    socket: str
+    """The group's input."""
     description: str
-    """Of the group's input."""
     role: str
     """Of the Image node, see `outputs.shared.compositor_tree`."""
     image: Callable[[DiskSettings], bpy.types.Image]
@@ -148,15 +149,17 @@ class Picture:
 
 
 PICTURES = {
-    "Colors": Picture(
+    "colors": Picture(
+        "Colors",
         "Table of the colors of hot bodies (Non-Color)",
         "disk_colors",
         lambda _settings: ensure_colors(),
     ),
-    "Texture": Picture(
+    "texture": Picture(
+        "Texture",
         "Azimuth across, from the inner edge down: streaks in red and clumps in green, or a picture of the disk",
         "disk_texture",
         lambda settings: settings.texture or ensure_texture(),
     ),
 }
-"""Name of the group's input -> what it reads."""
+"""Field of `disk_nodes.DiskInputs` -> the picture."""

@@ -11,6 +11,10 @@ from .sidebar import HolePanel, UmbraPanel
 # Identifiers as scripts write them -> names of the presets.
 PRESET_NAMES = {name.upper().replace(" ", "_"): name for name in physics.DISK_PRESET_TABLE}
 
+# Settings of the look in the panel Disk, and those that a picture replaces; the others are in Profile and Streaks.
+IN_FRONT = ("temperature", "exposure", "opacity", "beaming", "doppler_color", "doppler_brightness")
+OF_STREAKS = ("streaks", "clumps", "gain")
+
 
 def _preset_items() -> tuple[tuple[str, str, str, int], ...]:
     presets = {identifier: physics.DISK_PRESET_TABLE[name] for identifier, name in PRESET_NAMES.items()}
@@ -86,17 +90,15 @@ class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
         layout.use_property_split = True
         settings = frame_setup.active_hole(context.scene).umbra.disk
         layout.active = settings.enabled
-        layout.prop(settings, "profile")
-        if settings.profile == "power_law":
-            layout.prop(settings, "exponent")
-        for name in ("falloff", "color_variation", "inner_softness", "outer_softness"):
-            layout.prop(settings, name)
+        for name in physics.DISK_SETTINGS:
+            if name not in (*IN_FRONT, *OF_STREAKS) and (name != "exponent" or settings.profile == "power_law"):
+                layout.prop(settings, name)
         layout.separator()
         layout.template_ID(settings, "texture", open="image.open", text="Texture")
         if settings.texture is not None:
             layout.prop(settings, "texture_use")
         if not disk_properties.shows_picture(settings):
-            for name in ("streaks", "clumps", "gain"):
+            for name in OF_STREAKS:
                 layout.prop(settings, name)
         layout.prop(settings, "turning_speed")
 

@@ -121,7 +121,7 @@ def test_it_renders_as_the_same_scene_does_that_is_new(tmp_path: Path, path: Pat
     assert np.ptp(old[..., 0]) > 0.1
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*FILES, SAVED / "animated_4.5.blend"], ids=lambda path: path.stem)
 def test_files_are_small_and_name_no_machine(tmp_path: Path, path: Path) -> None:
     assert path.stat().st_size < LARGEST_FILE
     bpy.ops.wm.open_mainfile(filepath=str(path))

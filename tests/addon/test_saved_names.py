@@ -205,10 +205,12 @@ def test_it_renders_as_the_same_scene_does_that_is_new(opened: bpy.types.Scene, 
     assert np.ptp(old[..., 0]) > 0.1
 
 
-def test_appended_data_is_brought_up_to_date() -> None:
-    with bpy.data.libraries.load(str(FILES[-1])) as (source, target):
+@pytest.mark.parametrize("link", [False, True], ids=["appended", "linked"])
+def test_data_of_another_file_is_brought_up_to_date(link: bool) -> None:
+    with bpy.data.libraries.load(str(FILES[-1]), link=link) as (source, target):
         target.objects = [name for name in source.objects if name == IN_STRIPS]
     (hole,) = target.objects
+    assert hole.umbra.disk.doppler_color == pytest.approx(0.25)  # as animated at the frame that was saved
     (track,) = hole.animation_data.nla_tracks
     assert [curve.data_path for curve in curves_of(track.strips[0].action)] == [DOPPLER]
 

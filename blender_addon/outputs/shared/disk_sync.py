@@ -19,7 +19,7 @@ from .compositor_tree import ROLE, find_node, find_tree
 from .map_images import read_sequence
 
 DISK = "disk"
-PICTURE_ROLES = {name: picture.role for name, picture in disk_images.PICTURES.items()}
+PICTURE_ROLES = {picture.socket: picture.role for picture in disk_images.PICTURES.values()}
 # Nodes that only files have whose group was of version 1.
 FORMER_ROLES = ("disk_profile",)
 
