@@ -2,10 +2,11 @@
 """The protocol of outputs: what the rest of the add-on may ask of a way to show the black hole.
 
 An output is one object for all scenes; what it knows of a scene lies in the scene. A new output is a subclass of
-`Output` with a line in `registration`, and one in the contracts of pyproject.toml. The methods that raise
-`NotImplementedError` must be written; the others do what suits an output that shows baked maps and nothing else.
+`Output` with a line in `registration`, and one in the contracts of pyproject.toml. The abstract
+methods must be written; the others do what suits an output that shows baked maps and nothing else.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Generator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -69,7 +70,7 @@ class FrameCarrier(Protocol):
         """Keep the scene, for as long as the block lasts, as a file needs it that renders without the add-on."""
 
 
-class Output:
+class Output(ABC):
     """One way in which the black hole comes into the picture."""
 
     identifier: str
@@ -90,13 +91,13 @@ class Output:
             If `install` or a render would fail.
         """
 
+    @abstractmethod
     def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
         """Set a checked scene up; return what the artist should know."""
-        raise NotImplementedError
 
+    @abstractmethod
     def remove(self, scene: bpy.types.Scene) -> None:
         """Put back all that `install` has changed."""
-        raise NotImplementedError
 
     def look(self, scene: bpy.types.Scene) -> Look:
         """Return how the artist has set the sky, to be carried to another output."""
@@ -125,9 +126,9 @@ class Output:
 
     # --- rendering --------------------------------------------------------------------------------
 
+    @abstractmethod
     def is_in_use(self, scene: bpy.types.Scene) -> bool:
         """Return whether rendering the scene shows its black hole."""
-        raise NotImplementedError
 
     def uses_compositor(self, scene: bpy.types.Scene) -> bool:
         """Return whether a render runs nodes of this output in the compositor."""
@@ -137,9 +138,9 @@ class Output:
         """Return whether the scene's frames need any maps."""
         return True
 
+    @abstractmethod
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
         """Return all maps that a frame needs."""
-        raise NotImplementedError
 
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Return the map whose accuracy can be checked.
@@ -154,10 +155,11 @@ class Output:
     def begin_render(self, scene: bpy.types.Scene) -> None:
         """Prepare the scene for a render of one frame or many."""
 
+    @abstractmethod
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Show no map: the picture is magenta or black until `point_at` has seen to the frame."""
-        raise NotImplementedError
 
+    @abstractmethod
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let a frame's picture read its maps, which are valid; return warnings.
 
@@ -166,7 +168,6 @@ class Output:
         SceneError
             If the picture would be wrong.
         """
-        raise NotImplementedError
 
     def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
         """Bring the scene back after a render; canceled if a frame was begun and not finished."""
