@@ -41,7 +41,7 @@ class WorldOutput(Output):
         if is_new:
             write_to_group(node, {name: value for name, value in look.items() if name in CARRIED})
             if PLACEMENT["Rotation"] in look:
-                lensed_world.place(scene, look[PLACEMENT["Rotation"]], look[PLACEMENT["Strength"]])
+                lensed_world.place(scene, look[PLACEMENT["Rotation"]], look.get(PLACEMENT["Strength"], 1.0))
         return []
 
     def remove(self, scene: bpy.types.Scene) -> None:
