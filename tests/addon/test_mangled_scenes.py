@@ -7,6 +7,7 @@ handler does, drawing the panel's lines does not, and a render either shows the 
 
 import math
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -219,8 +220,8 @@ OPERATORS = [
 
 
 def one_sentence(text: str) -> bool:
-    """A report as an operator gives it, and no traceback."""
-    return "Traceback" not in text and text.startswith("Error: ") and text.rstrip().endswith(".")
+    """A report as an operator gives it, with its code, and no traceback."""
+    return "Traceback" not in text and re.fullmatch(r"Error: .*\. \[[a-z-]+\.[a-z-]+\]", text.strip()) is not None
 
 
 def call(name: str, **arguments: object) -> bool:
@@ -237,7 +238,7 @@ def call(name: str, **arguments: object) -> bool:
 def draw_and_handle(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene, tmp_path: Path) -> None:
     """The panel's lines, saving and opening: none may fail."""
     assert addon_module("ui.status").lines(bpy.context)
-    addon_module("ui.status").sky_problem(scene)
+    addon_module("outputs.registry").of(scene).sky_problem(scene)
     handlers = addon_module("render.handlers")
     handlers.on_save_pre(str(tmp_path / "saved.blend"))
     handlers.on_load_post("")
