@@ -7,7 +7,6 @@ import contextlib
 import io
 import os
 import re
-import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
@@ -19,29 +18,10 @@ from numpy.typing import NDArray
 
 from ..numerics.errors import ImageFileError
 from . import exr_header
+from .own_symbols import load_with_own_symbols
 
-
-@contextlib.contextmanager
-def _own_symbols() -> Iterator[None]:
-    """Let a library that is loaded within the block call its own functions before others of the same names.
-
-    Blender's executable has an OpenEXR of its own among its global symbols, of another version than the wheel's.
-    Calling that one crashes Blender 4.5. Only glibc has the flag; macOS and Windows bind each library to its own
-    symbols anyway.
-    """
-    if sys.platform != "linux":
-        yield
-        return
-    flags = sys.getdlopenflags()
-    sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
-    try:
-        yield
-    finally:
-        sys.setdlopenflags(flags)
-
-
-with _own_symbols():
-    import OpenEXR
+load_with_own_symbols("OpenEXR")
+import OpenEXR  # noqa: E402  loaded by the line before
 
 PathLike = str | os.PathLike[str]
 
