@@ -103,7 +103,7 @@ def test_a_write_that_fails_half_way(
             raise OSError(28, "No space left on device")
         replace(*paths)
 
-    monkeypatch.setattr(modules.exr.os, "replace", full)
+    monkeypatch.setattr(modules.physics.images.exr.os, "replace", full)
     assert run("bake") == 1
     assert "Frame 2: " in (error := capfd.readouterr().err)
     assert "free some space" in error

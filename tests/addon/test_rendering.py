@@ -62,7 +62,7 @@ def test_one_click_and_render(
     (name,) = map_files(tmp_path)
     assert name == "Scene_Black_Hole_64x36_0001.exr"
     warp_map = physics.read_warp_map(tmp_path / "maps" / name)
-    expected = reference.render(warp_map, environment_pixels(), foreground=foreground)
+    expected = reference.render_reference(warp_map, environment_pixels(), foreground=foreground)
     np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
     assert np.ptp(foreground[..., 3]) == 1.0  # the cube and the sky are both in the picture
     assert (warp_map.visibility == 0.0).any()
@@ -88,7 +88,7 @@ def test_sizes_and_samples(
     height, width = picture.shape[:2]
     assert (width, height) == (64 * percentage // 100, 36 * percentage // 100)
     assert warp_map.theta.shape == (height * int(samples), width * int(samples))
-    expected = reference.render(warp_map, environment_pixels(), output_size=(width, height))
+    expected = reference.render_reference(warp_map, environment_pixels(), output_size=(width, height))
     np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
 
 
@@ -170,7 +170,7 @@ def test_an_animation_with_marker_cameras(
     for frame in range(4):
         warp_map = physics.read_warp_map(tmp_path / "maps" / f"Scene_Black_Hole_64x36_{frame:04d}.exr")
         picture = read(tmp_path / f"frame_{frame:04d}.exr", exr)
-        expected = reference.render(warp_map, environment_pixels())
+        expected = reference.render_reference(warp_map, environment_pixels())
         np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
         distances.append(float(np.linalg.norm(warp_map.metadata["parameters"]["camera_position"])))
     assert abs(distances[1] - distances[2]) > 1.0  # the cut
@@ -195,7 +195,7 @@ def test_unusual_frames(
     picture = render(scene, tmp_path / "picture.exr", exr)
     (name,) = map_files(tmp_path)
     assert name == f"Scene_Black_Hole_64x36_{frame % 1_000_000:04d}.exr"
-    expected = reference.render(physics.read_warp_map(tmp_path / "maps" / name), environment_pixels())
+    expected = reference.render_reference(physics.read_warp_map(tmp_path / "maps" / name), environment_pixels())
     np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
 
 
@@ -214,7 +214,7 @@ def test_the_worlds_rotation_and_strength(
     bpy.ops.render.render(animation=True)
     for frame, value in ((1, 0.5), (3, 1.5)):
         warp_map = physics.read_warp_map(tmp_path / "maps" / f"Scene_Black_Hole_64x36_{frame:04d}.exr")
-        expected = reference.render(warp_map, environment_pixels(), rotation=(0.4, -0.3, 1.2), strength=value)
+        expected = reference.render_reference(warp_map, environment_pixels(), rotation=(0.4, -0.3, 1.2), strength=value)
         picture = read(tmp_path / f"frame_{frame:04d}.exr", exr)
         np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
 
