@@ -68,8 +68,7 @@ class MapKind:
 
 def _write_warp_map(path: Path, warp_map: "physics.WarpMap") -> None:
     """Write a map and its disk's passes; the map comes last, so that where it is valid they are there."""
-    for one in warp_map.disk_passes:
-        physics.write_disk_pass(pass_path(path, one.metadata["crossing"]), one)
+    physics.write_disk_passes(path, warp_map.disk_passes)
     physics.write_warp_map(path, warp_map)
 
 
@@ -99,7 +98,9 @@ class MapRequest:
     def passes(self) -> tuple[Path, ...]:
         """Where the disk's passes lie; none if the map has no disk."""
         disk = self.parameters.disk if self.kind.has_passes else None
-        return tuple(Path(pass_path(self.path, number + 1)) for number in range(0 if disk is None else disk.crossings))
+        return tuple(
+            Path(physics.pass_path(self.path, number + 1)) for number in range(0 if disk is None else disk.crossings)
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -165,12 +166,6 @@ def file_name(
     if kind.is_hashed and parameters is not None:
         end += kind.hash_mark + parameters.hash[:_HASH_CHARACTERS]
     return f"{names_of(scene, hole_name)}_{size[0]}x{size[1]}_{end}.exr"
-
-
-def pass_path(path: "Path | str", crossing: int) -> str:
-    """Return where a disk's pass lies: beside its map, _disk1 before the frame's number for the first crossing."""
-    beginning, _, end = str(path).rpartition("_")
-    return f"{beginning}_disk{crossing}_{end}"
 
 
 def older_maps(wanted: MapRequest) -> list[Path]:

@@ -13,7 +13,7 @@ from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
 from ..shared import disk_sync, leaving
 from ..shared.compositor_tree import find_tree
-from ..shared.look import look_of_scene, write_to_scene
+from ..shared.look import look_of_scene
 from ..shared.tree_editing import check_shared
 from . import foreground, lens_camera, lens_disk, lens_objects, lens_shader, lens_sync, lens_tree, panel
 from .carrier import LensCarrier
@@ -49,7 +49,6 @@ class LensOutput(Output):
 
     def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
         """Convert the scene's cameras."""
-        write_to_scene(scene, look)
         for camera in lens_camera.cameras_of(scene):
             lens_camera.convert(camera)
         return []
@@ -75,7 +74,7 @@ class LensOutput(Output):
         try:
             lens_disk.refresh(scene)
         except SceneError as error:
-            messages.warn(str(error))
+            messages.warn(error.for_user())
 
     def refresh_disk(self, scene: bpy.types.Scene) -> None:
         """Put the disk over the lens's picture, or take it out."""

@@ -9,7 +9,6 @@ import math
 
 import bpy
 
-from ...bake.request import pass_path
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import disk_group, disk_images
@@ -295,7 +294,7 @@ def _drives(curve: bpy.types.FCurve, expression: str, source: tuple[bpy.types.ID
 def point_passes(tree: bpy.types.NodeTree, path: str) -> None:
     """Let the disk's passes be read from beside a map."""
     for node, crossing in passes_of(tree):
-        read_sequence(node, f"Umbra Disk Pass {crossing}", pass_path(path, crossing))
+        read_sequence(node, f"Umbra Disk Pass {crossing}", physics.pass_path(path, crossing))
 
 
 def passes_of(tree: bpy.types.NodeTree) -> list[tuple[bpy.types.Node, int]]:
