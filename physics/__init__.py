@@ -40,7 +40,7 @@ from .images.exr import replacing as replacing_file
 from .images.exr import target_of as temporary_target
 from .images.png import write_png
 from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
-from .kerr.observer import Observer
+from .kerr.observer import Observer, local_velocity
 from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
 from .light.color import CHANNEL_WAVELENGTHS, SECOND_RADIATION_CONSTANT, redshift_gain
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
@@ -210,6 +210,7 @@ __all__ = [
     "galactic_axes",
     "horizon_radius",
     "isco_radius",
+    "local_velocity",
     "looking_at_hole",
     "matter_direction",
     "orbital_frequency",
