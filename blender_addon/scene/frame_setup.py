@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import image_library
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
@@ -438,6 +439,7 @@ def read(
     physics.BlackHoleError
         Whatever makes the frame impossible, as one sentence for the artist.
     """
+    image_library.check()
     check_render(scene.render, traits)
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
