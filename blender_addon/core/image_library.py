@@ -7,8 +7,12 @@ from pathlib import Path
 import bpy
 
 from . import messages
-from .errors import SceneError
 from .physics_api import physics
+
+REMEDY = (
+    "install Umbra Black Hole again from the zip for this system, disable other add-ons that bring an OpenEXR of their "
+    "own, and start Blender anew"
+)
 
 
 def check() -> None:
@@ -16,25 +20,17 @@ def check() -> None:
 
     Raises
     ------
-    SceneError
+    physics.ImageFileError
         As one sentence, which says what to do.
     """
-    try:
-        physics.exr_library(_folders())
-    except physics.ImageFileError as error:
-        raise SceneError(
-            "Maps can be neither read nor written, because the package OpenEXR that comes with Umbra Black Hole could "
-            "not be loaded and this Blender has no OpenImageIO: install the extension again from the zip for this "
-            "system, and disable other add-ons that bring an OpenEXR of their own.",
-            code=error.code,
-        ) from error
+    physics.exr_library(_folders(), REMEDY)
 
 
 def register() -> None:
     """Say it as soon as the extension is enabled; the panel and every operation say it too."""
     try:
         check()
-    except SceneError as error:
+    except physics.ImageFileError as error:
         messages.warn(error.for_user())
         if not messages.without_window():
             messages.popup(error.for_user())

@@ -27,17 +27,21 @@ class Library(Protocol):
         """Write a file of scan lines with ZIP compression, or raise RuntimeError."""
 
 
+REMEDY = "install the package OpenEXR, 3.3 or newer, into this Python"
+
 _lock = threading.Lock()
-_found: list[Library] = []
 
 
-def library(folders: Sequence[str] = ()) -> Library:
+class _Choice:
+    """The library of this process, once it is found, and how to look for it."""
+
+    found: Library | None = None
+    folders: tuple[str, ...] = ()
+    remedy = REMEDY
+
+
+def library() -> Library:
     """Return the library of this process.
-
-    Parameters
-    ----------
-    folders : sequence of str, optional
-        Where OpenImageIO may lie besides Python's path.
 
     Returns
     -------
@@ -49,18 +53,20 @@ def library(folders: Sequence[str] = ()) -> Library:
         There is none.
     """
     with _lock:
-        if not _found:
-            _found.append(_choose(folders))
-        return _found[0]
+        if _Choice.found is None:
+            _Choice.found = _choose()
+        return _Choice.found
 
 
-def exr_library(folders: Sequence[str] = ()) -> str:
+def exr_library(folders: Sequence[str] = (), remedy: str = REMEDY) -> str:
     """Make sure that EXR files can be read and written, before any work.
 
     Parameters
     ----------
     folders : sequence of str, optional
         Where OpenImageIO may lie besides Python's path: it stands in for the package OpenEXR, where that is missing.
+    remedy : str, optional
+        The end of the sentence that is said when there is no library, now or later: what to do.
 
     Returns
     -------
@@ -72,19 +78,20 @@ def exr_library(folders: Sequence[str] = ()) -> str:
     ImageFileError
         There is none.
     """
-    return library(folders).name
+    with _lock:
+        _Choice.folders, _Choice.remedy = tuple(folders), remedy
+    return library().name
 
 
-def _choose(folders: Sequence[str]) -> Library:
+def _choose() -> Library:
     reasons = []
-    choices: tuple[Callable[[], Library], ...] = (OpenEXRLibrary, lambda: OpenImageIOLibrary(folders))
+    choices: tuple[Callable[[], Library], ...] = (OpenEXRLibrary, lambda: OpenImageIOLibrary(_Choice.folders))
     for choice in choices:
         try:
             return choice()
         except Exception as error:  # noqa: BLE001  a broken package can raise anything while it is imported
             reasons.append(" ".join(str(error).split()) or type(error).__name__)
     raise ImageFileError(
-        f"EXR files can be neither read nor written ({', and '.join(reasons)}): install the package OpenEXR, 3.3 or "
-        "newer, into this Python.",
+        f"EXR files can be neither read nor written ({', and '.join(reasons)}): {_Choice.remedy}.",
         code="file.no-library",
     )

@@ -146,12 +146,16 @@ def refused(operator, **arguments):
     else:
         raise SystemExit(f"{operator.idname()} was not refused")
     assert "[file.no-library]" in text and "Traceback" not in text, text
+    assert "install Umbra Black Hole again" in text, text
 for operator in (bpy.ops.umbra.bake_animation, bpy.ops.umbra.bake_frame, bpy.ops.umbra.clean_maps):
     refused(operator)
 status = import_module(umbra.__name__ + ".ui.status")
 assert "neither read nor written" in " ".join(each.text for each in status.lines(bpy.context))
 print("panel says it", flush=True)
 scene.render.filepath = str(folder / "picture.exr")
+other = bpy.data.scenes.new("Other")
+with bpy.context.temp_override(scene=other):
+    refused(bpy.ops.umbra.add_black_hole)  # with its sky of stars, which is a file
 bpy.ops.render.render(write_still=True)
 print("rendered")
 """
@@ -164,8 +168,8 @@ def test_without_any_library_the_extension_says_so(addon: object, tmp_path: Path
     assert result.stdout.count("panel says it") == 1, result.stdout + result.stderr
     assert "rendered" not in result.stdout
     lines = result.stderr.strip().splitlines()
-    assert lines[0].startswith("Umbra: Maps can be neither read nor written")
+    assert lines[0].startswith("Umbra: EXR files can be neither read nor written")
     assert lines[-1].startswith("Error: Umbra Black Hole: ")
-    assert "install the extension again" in lines[-1]
+    assert "install Umbra Black Hole again" in lines[-1]
     assert "Traceback" not in result.stderr
     assert not list(tmp_path.rglob("*.exr"))
