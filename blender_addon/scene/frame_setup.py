@@ -12,21 +12,20 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
+from . import rotations
 from .camera_type import original_type
+from .rotations import Matrix, Vector
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
 MATRIX_TOLERANCE = 1e-4
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Row = tuple[float, float, float]
 Rows = tuple[Row, Row, Row]
 
@@ -165,7 +164,7 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
         The axes are not a rotation times a scale: non-uniform, sheared, mirrored or zero.
     """
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
-    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    lengths = rotations.length(matrix[:3, :3])
     if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
         raise SceneError(
             f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.',
@@ -178,19 +177,18 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
             code="hole.scale-uneven",
         )
     axes = matrix[:3, :3] / lengths
-    if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
+    if np.abs(rotations.times(axes.T, axes) - np.eye(3)).max() > MATRIX_TOLERANCE:
         raise SceneError(
             f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.',
             code="hole.scale-uneven",
         )
-    if np.linalg.det(axes) < 0.0:
+    if rotations.determinant(axes) < 0.0:
         raise SceneError(
             f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.',
             code="hole.scale-negative",
         )
-    # the nearest rotation, free of float32's rounding
-    left, _, right = np.linalg.svd(axes)
-    return Pose(matrix[:3, 3], left @ right, float(lengths.mean()))
+    scale = float(lengths[0] + lengths[1] + lengths[2]) / 3.0
+    return Pose(matrix[:3, 3], rotations.nearest_rotation(axes), scale)  # free of float32's rounding
 
 
 def camera_velocity(
@@ -402,7 +400,7 @@ def read(
         if velocity is None:
             layer = scene.view_layers.get(depsgraph.view_layer.name) or scene.view_layers[0]
             velocity = camera_velocity(scene, hole, camera, layer)
-        speed = world_to_hole @ velocity / hole_settings.speed_of_light
+        speed = rotations.times(world_to_hole, velocity) / hole_settings.speed_of_light
         if np.linalg.norm(speed) >= 1.0:
             raise SceneError(
                 f'Frame {scene.frame_current}: camera "{camera.name}" moves at {np.linalg.norm(speed):.3g} '
@@ -413,12 +411,12 @@ def read(
 
     settings = scene.umbra
     tolerance, interpolation = tolerances_of(settings)
-    position = world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m
+    position = rotations.times(world_to_hole, camera_pose.position - hole_pose.position) / length_of_m
     parameters = physics.WarpMapParameters(
         spin=float(hole_settings.spin),
         camera=camera_model(evaluated_camera.data, scene.render, scene.render.engine, traits),
         camera_position=_row(position),
-        camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
+        camera_to_hole=_rows(rotations.times(world_to_hole, camera_pose.rotation)),
         hole_to_world=_rows(hole_pose.rotation),
         motion=MOTIONS[hole_settings.motion],
         velocity=_row(speed),

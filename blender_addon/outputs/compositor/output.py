@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import WARP_MAP, MapRequest, request
+from ...bake.kinds import WARP_MAP
+from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
@@ -177,10 +178,6 @@ class CompositorOutput(Output):
     def is_set_up(self, scene: bpy.types.Scene) -> bool:
         """Return whether the group is in the compositor."""
         return find_setup(scene) is not None
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the group read the same files from another folder."""
-        compositor_sync.move_map_path(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import EXIT_MAP, MapRequest, request
+from ...bake.kinds import EXIT_MAP
+from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
@@ -154,10 +155,6 @@ class LensOutput(Output):
     def point_at_files(self, scene: bpy.types.Scene) -> None:
         """Let the disk read the passes of the settings that are saved."""
         lens_disk.point_at_passes(scene)
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the disk read the same passes from another folder."""
-        lens_disk.move_passes(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the passes from their files again."""

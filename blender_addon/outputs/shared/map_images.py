@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...bake.request import SEQUENCE_LENGTH
+from ...bake.names import SEQUENCE_LENGTH
 
 # A file that never exists: a frame without a valid map is magenta instead of showing some older map.
 NO_MAP = "no_warp_map_0001.exr"

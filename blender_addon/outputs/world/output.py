@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import WORLD_MAP, MapRequest, request
+from ...bake.kinds import WORLD_MAP
+from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...scene.frame_setup import FrameSetup, Traits
@@ -97,10 +98,6 @@ class WorldOutput(Output):
         """Let the World read the maps of the settings that are saved."""
         if scene.library is None:
             world_sync.point_at_files(scene)
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the World read the same files from another folder."""
-        world_sync.move_map_path(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""
