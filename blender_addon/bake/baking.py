@@ -216,9 +216,7 @@ class _Work:
         made = False
         for wanted in stale:
             prepare(wanted)
-            if self._half_files is None:
-                self._half_files = map_folder.half_files(wanted.path.parent)
-            if not take(self._claims, wanted, self._half_files):
+            if not take(self._claims, wanted, self._half_files_beside(wanted.path)):
                 self._refused = wanted.path
                 return False
             is_last = wanted is stale[-1]
@@ -237,9 +235,24 @@ class _Work:
         if made:
             self.summary.baked.append(frame)
             return True
+        self._sweep(needed)
         self.summary.reused.append(frame)
         yield self._progress(frame, outcome=KEPT)
         return True
+
+    def _sweep(self, needed: list[MapRequest]) -> None:
+        """Remove what a killed process has left of maps that are valid all the same."""
+        for wanted in needed:
+            half_files = self._half_files_beside(wanted.path)
+            if claim.claim_path(wanted.path).exists() or any(one.name in half_files for one in wanted.files):
+                with suppress(physics.BlackHoleError):  # a folder that can only be read
+                    if take(self._claims, wanted, half_files):
+                        self._claims.release(wanted.path)
+
+    def _half_files_beside(self, path: Path) -> dict[str, list[Path]]:
+        if self._half_files is None:
+            self._half_files = map_folder.half_files(path.parent)
+        return self._half_files
 
     def _other_names_beside(self, path: Path) -> OtherNames:
         if self._other_names is None:
