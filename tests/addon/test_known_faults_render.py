@@ -60,9 +60,6 @@ os._exit(0)
     np.testing.assert_allclose(places, [(6.0, -7.0, 5.0), (7.0, -7.0, 5.0)], rtol=1e-6)
 
 
-@pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="The render is ended for a missing warp map, not for the strip."
-)
 def test_a_strip_in_the_sequencer_is_named(tmp_path: Path) -> None:
     """Blender renders the strips alone: it may do so, or the refusal says that they are the reason."""
     change = """
@@ -80,9 +77,6 @@ os._exit(0)
     assert result.returncode == 0 or "sequencer" in result.stderr.lower(), result.stderr
 
 
-@pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="The color space Non-Color is not in such a configuration."
-)
 def test_a_hole_with_a_studios_color_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
     """OpenColorIO's own ACES configuration, which Blender loads by its name."""
     monkeypatch.setenv("OCIO", ACES)

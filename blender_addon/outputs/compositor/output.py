@@ -12,7 +12,7 @@ from ...nodes import black_hole_group
 from ...scene import environment
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
-from ..shared import disk_sync, leaving
+from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import check_linked, check_rendered, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
@@ -154,6 +154,7 @@ class CompositorOutput(Output):
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the group read no map, and refuse a compositor that could not show one."""
         compositor_sync.point_at_nothing(scene)
+        sequencer.check(scene)
         check_rendered(scene)
         check_linked(scene)
 

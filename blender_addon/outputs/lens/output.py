@@ -12,7 +12,7 @@ from ...scene import frame_setup
 from ...scene.frame_setup import FrameSetup
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
-from ..shared import disk_sync, leaving
+from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import find_tree
 from ..shared.look import look_of_scene
 from ..shared.tree_editing import check_shared
@@ -123,6 +123,7 @@ class LensOutput(Output):
         """Let neither camera nor disk show anything."""
         lens_sync.break_camera(scene)
         lens_disk.point_at_nothing(scene)
+        sequencer.check(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Give the camera the frame's parameters and its map."""

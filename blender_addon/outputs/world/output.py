@@ -9,6 +9,7 @@ from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
+from ..shared import sequencer
 from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
@@ -82,6 +83,7 @@ class WorldOutput(Output):
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the World read no map, and refuse one that is not the lensed one any more."""
         world_sync.point_at_nothing(scene)
+        sequencer.check(scene)
         check_world(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
