@@ -8,6 +8,7 @@ from collections.abc import Callable
 import bpy
 
 from .command import command_line
+from .core import image_library
 from .core.session import SESSION, Life
 from .outputs import registration as outputs
 from .preview import live_preview
@@ -40,6 +41,7 @@ _CLASSES = (
 
 # Each has a function `register` and one that undoes it.
 _MODULES = (
+    image_library,
     hole_properties,
     scene_properties,
     outputs,

@@ -38,9 +38,10 @@ from .geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS, Fate, 
 from .images.exr import read_exr, read_exr_header, write_exr
 from .images.exr import replacing as replacing_file
 from .images.exr import target_of as temporary_target
+from .images.exr_library import exr_library
 from .images.png import write_png
 from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
-from .kerr.observer import Observer
+from .kerr.observer import Observer, local_velocity
 from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
 from .light.color import CHANNEL_WAVELENGTHS, SECOND_RADIATION_CONSTANT, redshift_gain
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
@@ -206,10 +207,12 @@ __all__ = [
     "disk_texture",
     "drain",
     "ergosphere_radius",
+    "exr_library",
     "find_pass",
     "galactic_axes",
     "horizon_radius",
     "isco_radius",
+    "local_velocity",
     "looking_at_hole",
     "matter_direction",
     "orbital_frequency",

@@ -7,7 +7,7 @@ every datablock since the last time. So it holds a scene's number in the session
 
 import functools
 from collections.abc import Callable, Generator, Iterable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import bpy
 
@@ -25,9 +25,9 @@ Result = TypeVar("Result")
 _Work = Callable[[list[int], baking.RequestsAt, cache.FolderNames], Generator[baking.Progress, None, Result]]
 
 
-def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, velocity: Any = None) -> FrameSetup:
+def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, measured: bool = True) -> FrameSetup:
     """Return the setup of the frame at which the dependency graph stands; see `frame_setup.read`."""
-    return frame_setup.read(scene, depsgraph, velocity, registry.of(scene).traits)
+    return frame_setup.read(scene, depsgraph, measured, registry.of(scene).traits)
 
 
 def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> FrameSetup:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import bpy
-import numpy as np
 
 from ..core import changes
 from ..core.changes import Change
@@ -198,7 +197,7 @@ def _step(scene: bpy.types.Scene, now: _State) -> None:
     if now.steps is None:
         now.changed = False
         depsgraph = frame_setup.depsgraph_of(scene)
-        frame = frames.read(scene, depsgraph, np.zeros(3))
+        frame = frames.read(scene, depsgraph, False)
         now.problem = ""
         camera = _camera_of(scene, depsgraph, frame)
         key = (frame.parameters, camera, scene.umbra.output, thumbnail.key(scene))

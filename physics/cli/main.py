@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Protocol
 
+from ..images.exr_library import exr_library
 from ..numerics.errors import BlackHoleError
 from . import accuracy_command, bake_command, render_command, verify_command
 
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = make_parser().parse_args(arguments)
     try:
+        exr_library()  # before minutes of work
         options.run(options)
     except BlackHoleError as error:
         print(f"error: {error.for_user()}", file=sys.stderr)

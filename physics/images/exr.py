@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and writing OpenEXR files; the one module that knows the OpenEXR package."""
+"""Reading and writing EXR files: what is checked and promised whichever library does it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import contextlib
 import io
 import os
 import re
+import struct
 import tempfile
-import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,45 +18,16 @@ from numpy.typing import NDArray
 
 from ..numerics.errors import ImageFileError
 from . import exr_header
-from .own_symbols import load_with_own_symbols
+from .exr_library import library
 
-load_with_own_symbols("OpenEXR")
-import OpenEXR  # noqa: E402  loaded by the line before
+# At once, before anybody loads another: see `own_symbols`. Whoever needs it hears that there is none.
+with contextlib.suppress(ImageFileError):
+    library()
 
 PathLike = str | os.PathLike[str]
 
 # Names of files that are being written, or that a process was writing when it was killed.
 _TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.tmp(\.[^.]+)")
-
-# Header attributes that describe how a file is stored rather than what it is about.
-STRUCTURAL_ATTRIBUTES = frozenset(
-    "channels compression dataWindow displayWindow lineOrder pixelAspectRatio screenWindowCenter screenWindowWidth "
-    "type name version chunkCount tiles".split()
-)
-
-
-# More threads than this bring little: the checksum and the disk remain.
-MOST_THREADS = 8
-
-_library = threading.Lock()
-
-
-@contextlib.contextmanager
-def _library_threads() -> Iterator[None]:
-    """Let OpenEXR compress on all cores, for as long as the block lasts; one block at a time.
-
-    Its threads are ended again: left alive, they would have to be ended while the process ends, in any order.
-    """
-    set_count = getattr(OpenEXR, "set_global_thread_count", None)  # 3.3 has none
-    if set_count is None:
-        yield
-        return
-    with _library:
-        set_count(min(os.cpu_count() or 1, MOST_THREADS))
-        try:
-            yield
-        finally:
-            set_count(0)
 
 
 @contextlib.contextmanager
@@ -138,7 +109,7 @@ def write_exr(path: PathLike, pixels: NDArray[Any], attributes: Mapping[str, str
     Raises
     ------
     ImageFileError
-        When the file cannot be written.
+        When the file cannot be written, or there is no library that can.
     """
     names = "RGBA"[: pixels.shape[2]]
     write_channels(path, {name: np.ascontiguousarray(pixels[:, :, i]) for i, name in enumerate(names)}, attributes)
@@ -152,18 +123,13 @@ def write_channels(
     Raises
     ------
     ImageFileError
-        When the file cannot be written.
+        When the file cannot be written, or there is no library that can.
     """
-    header = {
-        **(attributes or {}),
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-    }
+    exr = library()
     expected = None
     with replacing(path) as temporary:
         try:
-            with _library_threads(), OpenEXR.File(header, dict(channels)) as file:
-                file.write(str(temporary))
+            exr.write(str(temporary), channels, attributes or {})
             expected = temporary.stat().st_size
         except RuntimeError as error:
             raise OSError(f"the EXR writer failed ({error})") from error
@@ -209,8 +175,10 @@ def read_channels(path: PathLike) -> tuple[dict[str, NDArray[Any]], dict[str, An
     ImageFileError
         When the file is missing or damaged.
     """
-    with _library_threads(), _opened(path, header_only=False) as file:
-        return {name: channel.pixels for name, channel in file.channels().items()}, _attributes(file)
+    exr = library()
+    data = _checked(path, header_only=False)
+    with _damage_told(path):
+        return exr.read(str(path), data), exr_header.attributes(io.BytesIO(data))
 
 
 def read_exr_header(path: PathLike) -> dict[str, Any]:
@@ -230,15 +198,16 @@ def read_exr_header(path: PathLike) -> dict[str, Any]:
     ImageFileError
         If the file is missing or its header is damaged.
     """
-    with _opened(path, header_only=True) as file:
-        return _attributes(file)
+    _checked(path, header_only=True)
+    with _damage_told(path), open(path, "rb") as stream:
+        return exr_header.attributes(stream)
 
 
-@contextlib.contextmanager
-def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
+def _checked(path: PathLike, header_only: bool) -> bytes:
+    """Return a file's bytes, none where only its header is read, if it is a file that can be read."""
     try:
-        data = Path(path).read_bytes() if not header_only else None
-        with io.BytesIO(data) if data is not None else open(path, "rb") as stream:
+        data = Path(path).read_bytes() if not header_only else b""
+        with io.BytesIO(data) if not header_only else open(path, "rb") as stream:
             size = stream.seek(0, os.SEEK_END)
             stream.seek(0)
             exr_header.check(stream, size, whole=not header_only)
@@ -248,22 +217,17 @@ def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
         raise ImageFileError(f"Cannot read {path}: {_reason(error)}.", code="file.no-access") from error
     except exr_header.BadHeader as error:
         raise ImageFileError(f"{path} {error}.", code="file.bad-exr") from error
+    return data
+
+
+@contextlib.contextmanager
+def _damage_told(path: PathLike) -> Iterator[None]:
+    """Turn whatever a library says of a file into one sentence."""
     try:
-        source: Any = str(path) if data is None else io.BytesIO(data)
-        with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:
-            yield file
-    except (RuntimeError, ValueError, TypeError, MemoryError, UnicodeDecodeError) as error:
-        if isinstance(error, ImageFileError):
-            raise
+        yield
+    except (exr_header.BadHeader, struct.error, RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
         detail = str(error).strip() or type(error).__name__
         raise ImageFileError(f"{path} is damaged or cut short: {detail}.", code="file.bad-exr") from error
-
-
-def _attributes(file: OpenEXR.File) -> dict[str, Any]:
-    header = file.header()
-    (left, top), (right, bottom) = (tuple(int(value) for value in corner) for corner in header["dataWindow"])
-    kept = {name: value for name, value in header.items() if name not in STRUCTURAL_ATTRIBUTES}
-    return {**kept, "size": (right - left + 1, bottom - top + 1)}
 
 
 def _reason(error: OSError) -> str:

@@ -12,8 +12,9 @@ little-endian.
 from __future__ import annotations
 
 import math
+import os
 import struct
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 MAGIC = b"\x76\x2f\x31\x01"
 
@@ -38,6 +39,19 @@ LARGEST_RATIO = {0: 1.0, 1: 64.0, 2: 1032.0, 3: 1032.0, 5: 4.0 / 3.0 * 1032.0}
 
 # Bytes per pixel, by the number of a channel's type: unsigned, half, float.
 PIXEL_BYTES = {0: 4, 1: 2, 2: 4}
+
+# Header attributes that describe how a file is stored rather than what it is about.
+STRUCTURAL_ATTRIBUTES = frozenset(
+    "channels compression dataWindow displayWindow lineOrder pixelAspectRatio screenWindowCenter screenWindowWidth "
+    "type name version chunkCount tiles".split()
+)
+
+# Types of attributes that are numbers, as `struct` names them.
+NUMBERS = {
+    "int": "<i", "float": "<f", "double": "<d", "chromaticities": "<8f", "envmap": "<B", "v2i": "<2i", "v2f": "<2f",
+    "v2d": "<2d", "v3i": "<3i", "v3f": "<3f", "v3d": "<3d", "m33f": "<9f", "m44f": "<16f", "m33d": "<9d",
+    "m44d": "<16d",
+}  # fmt: skip
 
 # Values by name and type.
 Attributes = dict[tuple[str, str], bytes]
@@ -83,6 +97,41 @@ def check(stream: BinaryIO, size: int, *, whole: bool) -> None:
         raise BadHeader("is damaged: its header cannot be read") from error
     if whole and not version & TILED and kind != b"tiledimage":
         _check_chunks(stream, size, -(-height // LINES[compression]), 12 if version & MULTIPART else 8)
+
+
+def attributes(stream: BinaryIO) -> dict[str, Any]:
+    """Return what a file's header says, without a library.
+
+    Parameters
+    ----------
+    stream : binary file
+        A file that has passed `check`.
+
+    Returns
+    -------
+    dict
+        Texts and numbers by name, tuples where there are several, with ``size`` as (width, height). Structural
+        attributes and those of other types are left out.
+
+    Raises
+    ------
+    BadHeader, UnicodeDecodeError, struct.error
+        If the file is damaged.
+    """
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(8)
+    header = _read_attributes(stream, size)
+    left, top, right, bottom = struct.unpack("<4i", header["dataWindow", "box2i"])
+    found: dict[str, Any] = {}
+    for (name, kind), value in header.items():
+        if name in STRUCTURAL_ATTRIBUTES:
+            continue
+        if kind == "string":
+            found[name] = value.decode()
+        elif kind in NUMBERS:
+            numbers = struct.unpack(NUMBERS[kind], value)
+            found[name] = numbers if len(numbers) > 1 else numbers[0]
+    return {**found, "size": (right - left + 1, bottom - top + 1)}
 
 
 def _take(stream: BinaryIO, count: int, size: int) -> bytes:

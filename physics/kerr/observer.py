@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from ..numerics.checks import finite, vector
 from ..numerics.errors import BlackHoleError, UnstableOrbitWarning
+from ..numerics.sphere import spherical_triad
 from .metric import (
     LARGEST_RADIUS,
     check_spin,
@@ -22,6 +23,7 @@ from .metric import (
 )
 
 Direction = tuple[float, float, float]
+Vector = tuple[float, float, float]
 
 # A direction of motion is normalised for the caller when it is this near to a unit vector; anything further
 # off is more likely to be a mistake than a rounding error.
@@ -247,6 +249,55 @@ class Observer:
     def _rotating(cls, r: float, theta: float, phi: float, speed: float) -> Observer:
         """Return the observer moving along +phi-hat with `speed`, which may be negative."""
         return cls(r, theta, phi, abs(speed), (0.0, 0.0, math.copysign(1.0, speed) if speed else 1.0))
+
+
+def local_velocity(spin: float, position: Vector, velocity: Vector) -> Vector:
+    """Return what the local FIDO measures of a velocity that is given by coordinate time.
+
+    The FIDO's clocks run slower and its rulers are shorter than the coordinates', and it is carried round itself. With
+    dots for d/dt, beta_r = rho r' / (alpha sqrt(Delta)), beta_theta = rho theta' / alpha and
+    beta_phi = varpi (phi' - omega) / alpha: the orthonormal basis of the FIDO, BPT Eq. 3.2, in the functions of Eq. 1.
+    For phi' alone it is Eq. 14. Nothing at rest (velocity 0) is at rest for the FIDO: it is the static observer.
+
+    Parameters
+    ----------
+    spin : float
+        Kerr parameter, -1 < a < 1.
+    position : sequence of float, shape (3,)
+        Cartesian, in the hole's frame (z along the spin axis), units of M, outside the horizon. Its spherical
+        coordinates are taken as Boyer-Lindquist ones.
+    velocity : sequence of float, shape (3,)
+        The position's derivative by the coordinate time t, Cartesian in the same frame, units of c. Against the stars,
+        so that a frame that turns with something does not count.
+
+    Returns
+    -------
+    tuple of float, shape (3,)
+        Units of c; Cartesian components along r-hat, theta-hat and phi-hat, laid out as those of the position: the
+        `velocity` of `WarpMapParameters`. Its length is 1 or more where no observer can move like that.
+
+    Raises
+    ------
+    BlackHoleError
+        At or inside the horizon, or for numbers that are not finite.
+    """
+    spin = check_spin(spin)
+    x, y, z = vector(position, "the camera's position")
+    moving = vector(velocity, "the camera's velocity")
+    if not all(math.isfinite(value) for value in (x, y, z, *moving)):
+        raise BlackHoleError("The camera's place and velocity must be finite numbers.", code="camera.position")
+    r, theta, phi = math.hypot(x, y, z), math.atan2(math.hypot(x, y), z), math.atan2(y, x)
+    metric = metric_functions(spin, r, theta)
+    triad: list[list[float]] = spherical_triad(theta, phi).tolist()
+    # r', r theta' and r sin(theta) phi', so that nothing is divided by the sine
+    along = [row[0] * moving[0] + row[1] * moving[1] + row[2] * moving[2] for row in triad]
+    beta = (
+        metric.sigma / metric.delta * along[0],
+        metric.rho / (metric.alpha * r) * along[1],
+        (metric.sigma / (metric.rho * r) * along[2] - metric.varpi * metric.omega) / metric.alpha,
+    )
+    u, v, w = (sum(beta[axis] * triad[axis][i] for axis in range(3)) for i in range(3))
+    return u, v, w
 
 
 def _sense(prograde: bool) -> str:

@@ -281,7 +281,8 @@ def test_velocity_from_the_cameras_animation(shot: ModuleType, errors: ModuleTyp
     in_hole = Matrix.Rotation(-math.pi / 2, 3, "X") @ world
     parameters = read(shot, 6)
     assert parameters.motion == "velocity"
-    assert parameters.velocity == pytest.approx(tuple(in_hole), rel=1e-4, abs=1e-7)
+    expected = errors.local_velocity(parameters.spin, parameters.camera_position, tuple(in_hole))
+    assert parameters.velocity == pytest.approx(expected, rel=1e-4, abs=1e-7)
     assert scene.frame_current == 1
 
     hole.umbra.speed_of_light = 10.0
@@ -305,4 +306,145 @@ def test_a_cut_between_cameras_is_not_a_motion(shot: ModuleType) -> None:
     scene.collection.objects.link(second)
     for frame, camera in ((1, scene.camera), (6, second)):
         scene.timeline_markers.new(camera.name, frame=frame).camera = camera
-    assert read(shot, 6).velocity == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    parameters = read(shot, 6)  # the second camera stands on the axis, where there is no dragging
+    assert parameters.camera_position[2] > 0.0
+    assert parameters.velocity == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+
+def let_it_orbit(hole: bpy.types.Object, radius: float, turns_a_frame: float) -> bpy.types.Object:
+    """Parent the camera to an Empty at the hole that turns evenly about the hole's axis: an exact circle."""
+    scene = bpy.context.scene
+    camera = scene.camera
+    camera.animation_data_clear()
+    hub = bpy.data.objects.new("Hub", None)
+    scene.collection.objects.link(hub)
+    hub.location = hole.location
+    camera.parent = hub
+    camera.matrix_parent_inverse.identity()
+    camera.location = (radius, 0.0, 0.0)
+    for frame in (0, 100):
+        hub.rotation_euler.z = math.tau * turns_a_frame * frame
+        hub.keyframe_insert("rotation_euler", frame=frame)
+    for curve in curves_of(hub):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    return hub
+
+
+@pytest.mark.parametrize(
+    ("spin", "radius", "frames", "tolerance"),
+    [
+        (0.0, 6.0, 100, 2e-5),  # float32 places, 1e-7 of the radius, over a step of 0.06 radii
+        (0.9, 10.0, 24, 4e-5),  # a turn a second
+        (0.9, 3.0, 8, 2e-3),  # eight frames for a turn: (2 pi / 8)^4 / 480 = 8e-4 of a speed that alpha enlarges
+    ],
+)
+def test_a_keyframed_circular_orbit_has_the_speed_of_equation_14(
+    shot: ModuleType, errors: ModuleType, spin: float, radius: float, frames: int, tolerance: float
+) -> None:
+    """BPT Eq. 3.10 of the orbit whose angular velocity the keyframes have; 0.5 for spin 0 at 6 M."""
+    scene = bpy.context.scene
+    shrink(scene)
+    hole = add_hole(scene, motion="CAMERA_ANIMATION", mass_scale=0.5, spin=spin)
+    hole.location = (1.0, 2.0, -1.0)
+    omega = 1.0 / (radius**1.5 + spin)  # radians per M of time
+    let_it_orbit(hole, 0.5 * radius, 1.0 / frames)
+    seconds = frames / (scene.render.fps / scene.render.fps_base)
+    hole.umbra.speed_of_light = 0.5 * math.tau / omega / seconds  # scene units: a turn takes 2 pi / omega M of time
+    parameters = read(shot, 9)
+    speed = (radius**2 - 2.0 * spin * radius**0.5 + spin**2) / (
+        math.sqrt(radius**2 - 2.0 * radius + spin**2) * (radius**1.5 + spin)
+    )
+    if (spin, radius) == (0.0, 6.0):
+        assert speed == pytest.approx(0.5)
+    observer = parameters.observer()
+    assert observer.beta == pytest.approx(speed, abs=tolerance)
+    assert observer.direction == pytest.approx((0.0, 0.0, 1.0), abs=tolerance)
+    preset = errors.Observer.circular_orbit(spin, radius)
+    assert observer.beta == pytest.approx(preset.beta, abs=tolerance)
+
+
+def test_a_keyframed_fall_from_rest_at_infinity(shot: ModuleType, errors: ModuleType) -> None:
+    """dr/dt = -(1 - 2 M / r) sqrt(2 M / r) without spin, stepped here; the speed is the closed form sqrt(2 M / r).
+
+    The camera has a key each frame and moves straight between them. Within a frame its speed changes by a hundredth, by
+    which the mean of both sides is off in second order: 2e-3 is ample.
+    """
+    scene = bpy.context.scene
+    shrink(scene)
+    hole = add_hole(scene, motion="CAMERA_ANIMATION", mass_scale=1.0, spin=0.0)
+    hole.umbra.speed_of_light = 6.0
+    step = 6.0 / (scene.render.fps / scene.render.fps_base)  # M of time a frame
+    camera = scene.camera
+    camera.animation_data_clear()
+    r, found = 10.0, {}
+    for frame in range(1, 31):
+        camera.location = (0.0, -r, 0.0)
+        camera.keyframe_insert("location", frame=frame)
+        found[frame] = r
+        for _ in range(1000):
+            r -= step / 1000 * (1.0 - 2.0 / r) * math.sqrt(2.0 / r)
+    hole.location = (0.0, 0.0, 0.0)
+    for curve in curves_of(camera):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    observer = read(shot, 15).observer()
+    assert 7.0 < found[15] < 9.0
+    assert observer.beta == pytest.approx(math.sqrt(2.0 / found[15]), rel=2e-3)
+    assert observer.direction == pytest.approx((-1.0, 0.0, 0.0), abs=1e-4)
+
+
+def test_a_camera_at_rest_is_the_static_observer_whatever_the_hole_turns_about(
+    shot: ModuleType, errors: ModuleType
+) -> None:
+    """The stars stand along the scene's axes: a hole whose object turns about its own axis looks the same."""
+    scene = bpy.context.scene
+    shrink(scene)
+    hole = add_hole(scene, motion="CAMERA_ANIMATION", mass_scale=1.0, spin=0.9)
+    hole.location = (0.0, 0.0, 0.0)
+    scene.camera.animation_data_clear()
+    scene.camera.location = (0.0, -4.0, 1.0)
+    for frame in (1, 21):
+        hole.rotation_euler.z = 0.1 * frame
+        hole.keyframe_insert("rotation_euler", frame=frame)
+    parameters = read(shot, 11)
+    r, theta = math.sqrt(17.0), math.atan2(4.0, 1.0)
+    static = errors.Observer.static(0.9, r, theta, 0.0)
+    observer = parameters.observer()
+    assert static.beta > 0.02
+    assert observer.beta == pytest.approx(static.beta, abs=1e-6)
+    assert observer.direction == pytest.approx((0.0, 0.0, -1.0), abs=1e-5)
+
+
+def test_nothing_is_at_rest_within_the_ergosphere(shot: ModuleType, errors: ModuleType) -> None:
+    scene = bpy.context.scene
+    shrink(scene)
+    hole = add_hole(scene, motion="CAMERA_ANIMATION", mass_scale=1.0, spin=0.9)
+    hole.location = (0.0, 0.0, 0.0)
+    scene.camera.animation_data_clear()
+    scene.camera.location = (1.8, 0.0, 0.0)
+    with pytest.raises(errors.BlackHoleError, match=r'^Frame 3: camera "Camera" is inside the ergosphere') as caught:
+        read(shot, 3)
+    assert caught.value.code == "camera.ergosphere"
+    let_it_orbit(hole, 1.8, 1.0 / 24.0)
+    hole.umbra.speed_of_light = (
+        math.tau / 0.2
+    )  # a turn a second is 0.2 radians per M of time; light allows 0.07 to 0.34
+    assert read(shot, 3).observer().beta < 1.0
+
+
+def test_a_leap_beside_a_frame_does_not_move_its_camera(shot: ModuleType) -> None:
+    """A camera that stands, and leaps between frame 4 and frame 5, is at rest at frames 3 and 4, and at 6."""
+    scene = bpy.context.scene
+    shrink(scene)
+    add_hole(scene, motion="CAMERA_ANIMATION", mass_scale=1.0, spin=0.0)
+    camera = scene.camera
+    camera.animation_data_clear()
+    for frame, x in ((1, 9.0), (5, -9.0)):
+        camera.location.x = x
+        camera.keyframe_insert("location", frame=frame)
+    for curve in curves_of(camera):
+        for point in curve.keyframe_points:
+            point.interpolation = "CONSTANT"
+    for frame in (3, 4, 6):
+        assert read(shot, frame).observer().beta == 0.0

@@ -130,7 +130,7 @@ def test_never_uses_the_network(sources: dict[str, ast.Module]) -> None:
 
 
 def test_imports_only_what_blender_or_the_zip_brings(sources: dict[str, ast.Module]) -> None:
-    brought = {"bpy", "mathutils", "numpy", "OpenEXR"}
+    brought = {"bpy", "mathutils", "numpy", "OpenEXR", "OpenImageIO"}
     # In a checkout the add-on finds the physics beside it, under its plain name, and in one place only.
     extra = {"core/physics_api.py": {"physics"}}
     # Blender's own Python modules, part of every Blender.

@@ -7,7 +7,6 @@ are shared: those of the collection "Umbra Foreground" are seen by the plain cam
 """
 
 import bpy
-import numpy as np
 
 from ...core.errors import SceneError
 from ...scene import frame_setup
@@ -42,9 +41,7 @@ def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
     SceneError
         There is nothing nearer than the hole, or no camera.
     """
-    nearer = lens_objects.place(
-        scene, depsgraph, frame_setup.read(scene, depsgraph, np.zeros(3), lens_sync.TRAITS)
-    ).nearer
+    nearer = lens_objects.place(scene, depsgraph, frame_setup.read(scene, depsgraph, False, lens_sync.TRAITS)).nearer
     settings = scene.umbra
     if settings.foreground is None and not nearer:
         raise SceneError(

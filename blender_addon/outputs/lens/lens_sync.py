@@ -5,7 +5,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ...core.blender_version import OSL_COUNTS_ROWS_UPWARDS
 from ...core.errors import SceneError
@@ -104,13 +103,13 @@ def show(scene: bpy.types.Scene, frame: frame_setup.FrameSetup, map_path: Path |
 def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """Let the viewport see the scene as it stands, without a map; black where that is not possible.
 
-    The camera's own speed, which would take steps to other frames, is taken as none here.
+    The camera's own speed, which would take steps to other frames, is not measured here.
     """
     if depsgraph is None:
         depsgraph = frame_setup.depsgraph_of(scene)
     try:
         check(scene)
         camera_of(scene)
-        show(scene, frame_setup.read(scene, depsgraph, np.zeros(3), TRAITS))
+        show(scene, frame_setup.read(scene, depsgraph, False, TRAITS))
     except physics.BlackHoleError:  # the panel and the render say why
         break_camera(scene)
