@@ -27,7 +27,7 @@ demo:
 	  echo "The pictures are in $(abspath $(DEMO_FOLDER)):" && find "$(DEMO_FOLDER)" -name '*.png' | sort
 
 test:
-	@$(environment) && "$$python" -m pytest $(PYTEST_ARGUMENTS)
+	@$(environment) && "$$python" -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGUMENTS)
 
 lint:
 	@$(environment) && bin=$$(dirname "$$python") && "$$bin/ruff" check . && "$$bin/ruff" format --check . && "$$bin/mypy" && "$$bin/lint-imports"

@@ -10,7 +10,7 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,7 +21,9 @@ from ..core.physics_api import physics
 from . import claim
 from . import folder as map_folder
 from .check import fault_of, is_valid
-from .request import MapRequest, forget_shared_rays, older_maps
+from .kinds import forget_shared_rays
+from .request import MapRequest, older_maps
+from .reuse import OtherNames
 
 # What comes of a frame: its map was baked here, or was valid already.
 BAKED, KEPT = "baked", "kept"
@@ -113,7 +115,7 @@ def provide(wanted: MapRequest, *, may_bake: bool) -> None:
         If it is not, and may not or cannot be baked.
     """
     fault = fault_of(wanted)
-    if fault is None:
+    if fault is None or (take_over(wanted, OtherNames(wanted.path.parent)) and is_valid(wanted)):
         return
     if not may_bake:
         raise SceneError(
@@ -199,6 +201,7 @@ class _Work:
         self._fraction = 0.0
         self._claims, self._writing = claims, writing
         self._half_files: dict[str, list[Path]] | None = None
+        self._other_names: OtherNames | None = None
         self._being_written: tuple[MapRequest, bool] | None = None
         """The request, and whether it is the frame's last map."""
         self._refused: Path | None = None
@@ -213,13 +216,12 @@ class _Work:
         made = False
         for wanted in stale:
             prepare(wanted)
-            if self._half_files is None:
-                self._half_files = map_folder.half_files(wanted.path.parent)
-            if not take(self._claims, wanted, self._half_files):
+            if not take(self._claims, wanted, self._half_files_beside(wanted.path)):
                 self._refused = wanted.path
                 return False
             is_last = wanted is stale[-1]
-            if is_valid(wanted):  # somebody else has made it in the meantime
+            take_over(wanted, self._other_names_beside(wanted.path))
+            if is_valid(wanted):  # it was there by another name, or somebody else has made it in the meantime
                 self._claims.release(wanted.path)
                 if is_last and made:
                     yield from self.finish_writing()
@@ -233,9 +235,29 @@ class _Work:
         if made:
             self.summary.baked.append(frame)
             return True
+        self._sweep(needed)
         self.summary.reused.append(frame)
         yield self._progress(frame, outcome=KEPT)
         return True
+
+    def _sweep(self, needed: list[MapRequest]) -> None:
+        """Remove what a killed process has left of maps that are valid all the same."""
+        for wanted in needed:
+            half_files = self._half_files_beside(wanted.path)
+            if claim.claim_path(wanted.path).exists() or any(one.name in half_files for one in wanted.files):
+                with suppress(physics.BlackHoleError):  # a folder that can only be read
+                    if take(self._claims, wanted, half_files):
+                        self._claims.release(wanted.path)
+
+    def _half_files_beside(self, path: Path) -> dict[str, list[Path]]:
+        if self._half_files is None:
+            self._half_files = map_folder.half_files(path.parent)
+        return self._half_files
+
+    def _other_names_beside(self, path: Path) -> OtherNames:
+        if self._other_names is None:
+            self._other_names = OtherNames(path.parent)
+        return self._other_names
 
     def _trace(self, wanted: MapRequest) -> Generator[Progress, None, Any]:
         steps = wanted.kind.steps(wanted.parameters)
@@ -297,6 +319,13 @@ def take(claims: claim.Claims, wanted: MapRequest, half_files: dict[str, list[Pa
     except OSError as error:
         raise map_folder.explain(error, parent) from error
     return True
+
+
+def take_over(wanted: MapRequest, others: OtherNames) -> bool:
+    """Take a map over from another name; return whether that was possible."""
+    with suppress(OSError):  # a folder that cannot be written to is named when the map is baked
+        return others.take_over(wanted)
+    return False
 
 
 @contextmanager

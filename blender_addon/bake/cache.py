@@ -16,7 +16,8 @@ import bpy
 from . import baking, claim
 from . import folder as map_folder
 from .check import FAULTY, State, check
-from .request import MapRequest, kind_of, name_pattern
+from .names import kind_of, name_pattern, shot_name
+from .request import MapRequest
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class FolderNames:
 
     def __init__(self, scene: bpy.types.Scene, hole_name: str) -> None:
         self.folder = map_folder.folder(scene).path
-        self._pattern = name_pattern(scene, hole_name)
+        self._pattern = name_pattern(shot_name(scene, hole_name))
         self.maps: list[tuple[str, Path]] = []
         """Maps and passes, of whatever size and frame, and the maps that they belong to."""
         self._by_frame: dict[tuple[str, int], list[re.Match[str]]] = {}

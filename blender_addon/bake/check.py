@@ -7,7 +7,9 @@ import bpy
 
 from ..core.physics_api import physics
 from .folder import folder
-from .request import PASS_FORMAT, SEQUENCE_LENGTH, MapRequest, kind_of, name_pattern, older_maps
+from .kinds import PASS_FORMAT
+from .names import SEQUENCE_LENGTH, kind_of, name_pattern, shot_name
+from .request import MapRequest, older_maps
 
 State = physics.MapState
 
@@ -26,13 +28,13 @@ def check(wanted: MapRequest, *, thorough: bool = True) -> physics.MapFinding:
         Read and check the pixels too, 0.1 s in full HD; otherwise headers are trusted.
     """
     kind = wanted.kind
-    found = physics.check_map(wanted.path, kind.format, wanted.parameters.hash, thorough=thorough)
+    found = physics.check_map(wanted.path, kind.format, wanted.parameters, thorough=thorough)
     if found.state is State.MISSING and older_maps(wanted):
         return physics.MapFinding(State.STALE, f"The {kind.noun} {wanted.path} is out of date")
     for one in wanted.passes:
         if found.state is not State.VALID:
             break
-        found = physics.check_map(one, PASS_FORMAT, wanted.parameters.hash, thorough=thorough)
+        found = physics.check_map(one, PASS_FORMAT, wanted.parameters, thorough=thorough)
     return found
 
 
@@ -48,7 +50,7 @@ def is_valid(wanted: MapRequest, *, thorough: bool = True) -> bool:
 
 def count_baked(scene: bpy.types.Scene, hole_name: str, like: MapRequest, frames: range) -> int:
     """Return how many of the frames have a map of the same kind and size, up to date or not."""
-    pattern = name_pattern(scene, hole_name)
+    pattern = name_pattern(shot_name(scene, hole_name))
     size = "x".join(map(str, like.parameters.map_size))
     try:
         with os.scandir(folder(scene).path) as entries:

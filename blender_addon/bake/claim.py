@@ -135,7 +135,10 @@ def _take_over(path: Path, content: bytes) -> bool:
     successor = path.with_name(f"{path.name}.next")
     if not _create(successor, content):
         if _is_dead(successor):  # its process was killed just here
-            successor.unlink(missing_ok=True)
+            try:
+                successor.unlink(missing_ok=True)
+            except OSError:  # another user's, in a folder where only they may remove it: go on without a claim
+                return True
         return False
     if not _is_dead(path):  # another process was faster
         successor.unlink(missing_ok=True)

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of a scene's maps: where it is, whether it can be written to, and what stands in it half-written."""
 
+from __future__ import annotations
+
 import errno
 import os
+import re
+import secrets
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,14 +18,22 @@ import bpy
 
 from ..core.errors import MapFolderError
 from ..core.physics_api import physics
+from ..core.session import SESSION, Life, Value
 
 BYTES_PER_PIXEL = 32  # eight float32, before compression: an upper bound for the size of a map of any kind
 
 DEFAULT_FOLDER = "//umbra_maps/"
 _TEMPORARY_FOLDER = "umbra_maps"
 
-# The ending of copies that are being made while a file is saved for the first time.
-_PART = ".part"
+# What file systems answer that have no second names for files, or where the two are on different ones.
+_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EXDEV, errno.EMLINK)
+
+# Maps that are taken over from other names are hidden under such a name while they are copied.
+_PART = re.compile(r"\.(?P<target>.+\.exr)\.[0-9a-f]+\.part")
+
+
+# What the open file is being saved as, while it is.
+_saved_as: Value[Path | None] = SESSION.value(lambda: None, Life.FILE)
 
 
 @dataclass(frozen=True)
@@ -31,14 +45,50 @@ class MapFolder:
     is_temporary: bool
 
 
+def blend_file(scene: bpy.types.Scene) -> Path | None:
+    """Return the .blend file that a scene belongs to, its own one for a linked scene; None while there is none."""
+    if scene.library is not None:
+        return Path(bpy.path.abspath(scene.library.filepath))
+    if _saved_as.now is not None:
+        return _saved_as.now
+    return Path(bpy.data.filepath) if bpy.data.filepath else None
+
+
+@contextmanager
+def being_saved_as(blend: Path) -> Iterator[None]:
+    """Take the open file, for as long as the block lasts, as the one that it is about to be saved as."""
+    _saved_as.now = blend
+    try:
+        yield
+    finally:
+        _saved_as.now = None
+
+
 def folder(scene: bpy.types.Scene) -> MapFolder:
     """The folder of a scene's maps; a temporary one if it should be beside a file not saved yet."""
-    chosen = _chosen_folder(scene)
-    if chosen.startswith("//") and not bpy.data.filepath:
+    chosen, blend = _chosen_folder(scene), blend_file(scene)
+    if not chosen.startswith("//"):
+        return MapFolder(chosen, Path(chosen), False)
+    if blend is None:
         path = Path(bpy.app.tempdir or tempfile.gettempdir()) / _TEMPORARY_FOLDER
         return MapFolder(str(path) + os.sep, path, True)
-    # what a linked scene calls beside the file is beside its own file
-    return MapFolder(chosen, Path(bpy.path.abspath(chosen, library=scene.library)), False)
+    path = blend.parent / chosen.removeprefix("//")
+    if scene.library is not None:
+        return MapFolder(chosen, path, False)
+    return MapFolder(_as_blender_keeps_it(chosen, path), path, False)
+
+
+def _as_blender_keeps_it(chosen: str, path: Path) -> str:
+    """How Blender's data refer to a folder beside the .blend file.
+
+    While a file is saved into another directory, paths are still those of the old one; Blender adapts them.
+    """
+    if _saved_as.now is None or not bpy.data.filepath:
+        return chosen
+    old = Path(bpy.data.filepath).parent
+    if old == _saved_as.now.parent:
+        return chosen
+    return bpy.path.relpath(str(path), start=str(old)).rstrip("/") + "/"
 
 
 def _chosen_folder(scene: bpy.types.Scene) -> str:
@@ -46,7 +96,9 @@ def _chosen_folder(scene: bpy.types.Scene) -> str:
     chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
     if not chosen.startswith("//") and not Path(chosen).is_absolute():
         chosen = f"//{chosen}"
-    return chosen.rstrip("/\\") + "/"
+    beside, rest = ("//", chosen[2:]) if chosen.startswith("//") else ("", chosen)
+    rest = rest.rstrip("/\\")
+    return beside + (f"{rest}/" if rest or not beside else "")
 
 
 def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:
@@ -83,11 +135,46 @@ def half_files(directory: Path) -> dict[str, list[Path]]:
         return found
     for name in names:
         target = physics.temporary_target(name)
-        if target is None and name.startswith(".") and name.endswith(_PART):
-            target = name.removeprefix(".").removesuffix(_PART)
+        if target is None and (match := _PART.fullmatch(name)):
+            target = match["target"]
         if target is not None:
             found.setdefault(target, []).append(directory / name)
     return found
+
+
+def link(source: Path, target: Path, *, copy: bool) -> bool:
+    """Give a file a second name, replacing what has that name; return whether it has it now.
+
+    Maps are replaced and never changed in place, so that a second name costs no space and keeps its content.
+
+    Parameters
+    ----------
+    source, target : Path
+        The file, and its second name.
+    copy : bool
+        Copy the file where the file system has no second names; otherwise that is given up.
+
+    Raises
+    ------
+    OSError
+        If neither is possible.
+    """
+    if target.exists() and target.samefile(source):
+        return True
+    partial = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        try:
+            os.link(source, partial)
+        except OSError as error:
+            if not copy:
+                if error.errno in _NO_LINKS:
+                    return False
+                raise
+            shutil.copyfile(source, partial)
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
+    return True
 
 
 def explain(error: OSError, place: Path) -> MapFolderError:
@@ -113,43 +200,3 @@ def explain_reading(error: OSError, place: Path) -> MapFolderError:
         "its permissions.",
         code="folder.not-readable",
     )
-
-
-def adopt(scene: bpy.types.Scene, blend_file: Path) -> str | None:
-    """Bring a scene's maps from the temporary folder beside a file that is being saved for the first time.
-
-    Maps that are there already are kept.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its maps are looked for.
-    blend_file : Path
-        Where the file will be.
-
-    Returns
-    -------
-    str or None
-        The folder as Blender's data should refer to it; None if the scene's folder is not a temporary one.
-
-    Raises
-    ------
-    MapFolderError
-        The folder cannot be written to.
-    """
-    source = folder(scene)
-    if not source.is_temporary:
-        return None
-    blender_path = _chosen_folder(scene)
-    target = blend_file.parent / blender_path.removeprefix("//")
-    try:
-        for path in sorted(source.path.glob(f"{bpy.path.clean_name(scene.name)}_*.exr")):
-            destination = target / path.name
-            if not destination.exists():
-                target.mkdir(parents=True, exist_ok=True)
-                partial = destination.with_name(f".{destination.name}{_PART}")
-                shutil.copyfile(path, partial)
-                os.replace(partial, destination)
-    except OSError as error:
-        raise explain(error, target) from error
-    return blender_path

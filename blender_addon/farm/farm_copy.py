@@ -13,16 +13,13 @@ from pathlib import Path
 
 import bpy
 
+from ..bake.names import FARM_FRAMES, FARM_SUFFIX
 from ..core.errors import SceneError
 from ..outputs import frames as frame_maps
 from ..outputs import registry
 from ..outputs.protocol import FrameCarrier, Track
 from ..outputs.shared import disk_light
 from ..scene import frame_setup
-
-SUFFIX = "_farm"
-# On the scene, in the copy: the first and last frame that have keyframes. `farm/umbra_farm.py` reads it.
-FRAMES = "umbra_farm_frames"
 
 # What is animated, and its values by frame.
 Tracks = dict[Track, dict[int, float]]
@@ -32,7 +29,7 @@ _ADDON = "umbra."  # the paths of this add-on's settings begin so
 
 def path_beside(blend: Path) -> Path:
     """Where the copy of a file lies: beside it, so that relative paths hold."""
-    return blend.with_name(f"{blend.stem}{SUFFIX}.blend")
+    return blend.with_name(f"{blend.stem}{FARM_SUFFIX}.blend")
 
 
 def frames_of(scene: bpy.types.Scene) -> range:
@@ -61,7 +58,7 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
             code="farm.lighting-disk",
         )
     path = path_beside(Path(bpy.data.filepath))
-    if FRAMES in scene:
+    if FARM_FRAMES in scene:
         raise SceneError(
             "This file is a farm copy already: open the file that it was made from.", code="farm.copy-of-copy"
         )
@@ -80,7 +77,7 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
 
 def needs_copy(scene: bpy.types.Scene) -> bool:
     """Whether the scene's frames would be wrong without the add-on, but for those of such a copy."""
-    if FRAMES in scene:
+    if FARM_FRAMES in scene:
         return False
     return registry.of(scene).carrier(scene) is not None or any(True for _each in _drivers_of_settings())
 
@@ -169,7 +166,7 @@ def _written(
     device = getattr(scene.render, "compositor_device", None)
     made = []
     try:
-        scene[FRAMES] = [frames[0], frames[-1]]
+        scene[FARM_FRAMES] = [frames[0], frames[-1]]
         if device is not None:
             scene.render.compositor_device = "CPU"  # without a display there is usually no OpenGL
         for curve in muted:
@@ -187,7 +184,7 @@ def _written(
             curve.mute = False
         if device is not None:
             scene.render.compositor_device = device
-        del scene[FRAMES]
+        del scene[FARM_FRAMES]
 
 
 class _Curve:

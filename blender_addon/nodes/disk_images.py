@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import color_spaces
 from ..core.physics_api import physics
 from ..settings.typed import DiskSettings
 
@@ -41,9 +42,11 @@ def ensure_colors() -> bpy.types.Image:
 
     def pixels() -> FloatArray:
         kelvin = np.geomspace(physics.COLDEST_DISK, physics.HOTTEST_DISK, COLOR_ROWS)
-        return physics.disk_color(kelvin)[:, None, :]
+        return color_spaces.to_scene_linear(physics.disk_color(kelvin))[:, None, :]
 
-    return _ensure(COLORS_NAME, f"{COLOR_ROWS}", pixels)
+    red, _green, _blue = color_spaces.to_scene_linear(np.eye(3)).round(3).tolist()
+    space = "" if red == [1.0, 0.0, 0.0] else f" {red}"
+    return _ensure(COLORS_NAME, f"{COLOR_ROWS}{space}", pixels)
 
 
 def streaks() -> FloatArray:
@@ -66,7 +69,7 @@ def ensure_texture() -> bpy.types.Image:
         image = bpy.data.images.load(str(path))
         image.pack()
     image.name = TEXTURE_NAME
-    image.colorspace_settings.name = "Non-Color"
+    color_spaces.mark_as_data(image)
     # A file that is passed on must not contain paths of this computer.
     image.filepath_raw = f"//{path.name}"
     for packed in image.packed_files:
@@ -85,7 +88,7 @@ def _ensure(name: str, made_from: str, pixels: Callable[[], FloatArray]) -> bpy.
         if image is not None:
             image.name = f"{name} (former)"
         image = bpy.data.images.new(name, full.shape[1], full.shape[0], float_buffer=True)
-        image.colorspace_settings.name = "Non-Color"
+        color_spaces.mark_as_data(image)
     image.pixels.foreach_set(full[::-1].ravel())
     image.update()
     image.pack()
@@ -117,7 +120,7 @@ def mean_of_rows(image: bpy.types.Image) -> FloatArray | None:
         if pixels.shape[2] == 3:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
         if not image.is_float:  # byte images have the file's values: not linear, not premultiplied
-            if image.colorspace_settings.name == "sRGB":
+            if color_spaces.is_srgb(image):
                 color = pixels[..., :3]
                 linear = ((color + 0.055) / 1.055) ** 2.4
                 pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, linear)

@@ -191,9 +191,6 @@ class Output(ABC):
         """Let the scene refer to the maps of its settings, as a file that is saved should."""
         self.refresh(scene)
 
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the scene read the same files from another folder."""
-
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""
 

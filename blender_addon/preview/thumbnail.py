@@ -11,6 +11,7 @@ import bpy.utils.previews
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import color_spaces
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import registry
@@ -185,7 +186,7 @@ def _shrunk(image: bpy.types.Image) -> Array:
     rows, columns = height // step, width // step
     small = values[: rows * step, : columns * step].reshape(rows, step, columns, step, -1).mean(axis=(1, 3))
     small = small[..., :3] if image.channels >= 3 else np.repeat(small[..., :1], 3, axis=-1)
-    if not image.is_float and image.colorspace_settings.name == "sRGB":
+    if not image.is_float and color_spaces.is_srgb(image):
         small = np.where(small <= 0.04045, small / 12.92, ((small + 0.055) / 1.055) ** 2.4)
     shrunk: Array = small.astype(np.float64)
     return shrunk

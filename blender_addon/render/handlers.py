@@ -16,12 +16,11 @@ from typing import TypeVar
 import bpy
 
 from ..bake import baking
-from ..bake import folder as map_folder
 from ..core import messages
-from ..core.errors import MapFolderError, SceneError, unexpected
+from ..core.errors import SceneError, unexpected
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
-from ..outputs import frames, refreshing, registry
+from ..outputs import frames, refreshing, registry, saving
 from ..outputs.shared import disk_light
 from ..preview import live_preview
 from ..scene import frame_setup
@@ -204,6 +203,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     saved_names.migrate()
     for scene in bpy.data.scenes:
         if scene.library is None:
+            saving.on_load(scene)
             registry.of(scene).on_load(scene)
             refreshing.refresh_disk_or_warn(scene)  # a render refuses what this only tells
     live_preview.start_again()
@@ -219,23 +219,13 @@ def on_import_post(_imported: object = None, _unused: object = None) -> None:
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     live_preview.drop_live()
-    for scene in bpy.data.scenes:
-        output = registry.of(scene)
-        if not output.is_set_up(scene):
-            continue
-        output.point_at_files(scene)
-        try:
-            folder = map_folder.adopt(scene, Path(path)) if path and not bpy.data.filepath else None
-        except MapFolderError as error:
-            messages.warn(error.for_user())
-            continue
-        if folder is not None:
-            output.move_maps(scene, folder)
+    saving.before(Path(path or bpy.data.filepath))
 
 
 @persistent
-def on_save_post(_path: str = "", _unused: object = None) -> None:
+def on_save_post(path: str = "", _unused: object = None) -> None:
     """The file is saved: the preview shows itself again."""
+    saving.after(Path(path or bpy.data.filepath))
     live_preview.start_again()
 
 

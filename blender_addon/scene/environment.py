@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
+from ..core import color_spaces
 from ..core.blender_version import NODES_ARE_OPTIONAL
 from ..core.errors import SceneError
 from ..core.physics_api import PACKAGE, physics
@@ -244,6 +245,8 @@ def load_star_sky() -> bpy.types.Image:
         physics.write_exr(path, np.minimum(pixels, np.finfo(np.float16).max).astype(np.float16))
     image = bpy.data.images.load(str(path))
     image.name = STAR_SKY_NAME
+    if not color_spaces.mark_as_linear_rec709(image):
+        print("Umbra: the color configuration has no linear Rec.709, in which the stars are given", flush=True)
     image.pack()
     # no path of this computer in a file that may be passed on
     image.filepath_raw = f"//{_STAR_SKY_FILE}"

@@ -12,7 +12,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core import image_library
 from ..core.errors import SceneError
@@ -20,7 +19,9 @@ from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
+from . import rotations
 from .camera_type import original_type
+from .rotations import Matrix, Vector
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -29,8 +30,6 @@ MATRIX_TOLERANCE = 1e-4
 # Share by which velocities over one frame and over two can differ on a smooth way; on a circle of 4 frames it is 0.3.
 LEAP = 0.5
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Row = tuple[float, float, float]
 Rows = tuple[Row, Row, Row]
 
@@ -169,7 +168,7 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
         The axes are not a rotation times a scale: non-uniform, sheared, mirrored or zero.
     """
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
-    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    lengths = rotations.length(matrix[:3, :3])
     if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
         raise SceneError(
             f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.',
@@ -182,19 +181,18 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
             code="hole.scale-uneven",
         )
     axes = matrix[:3, :3] / lengths
-    if np.abs(axes.T @ axes - np.eye(3)).max() > MATRIX_TOLERANCE:
+    if np.abs(rotations.times(axes.T, axes) - np.eye(3)).max() > MATRIX_TOLERANCE:
         raise SceneError(
             f'{what} "{evaluated.name}" is sheared by the non-uniform scale of a parent: make that scale uniform.',
             code="hole.scale-uneven",
         )
-    if np.linalg.det(axes) < 0.0:
+    if rotations.determinant(axes) < 0.0:
         raise SceneError(
             f'{what} "{evaluated.name}" is mirrored by a negative scale: make its scale positive.',
             code="hole.scale-negative",
         )
-    # the nearest rotation, free of float32's rounding
-    left, _, right = np.linalg.svd(axes)
-    return Pose(matrix[:3, 3], left @ right, float(lengths.mean()))
+    scale = float(lengths[0] + lengths[1] + lengths[2]) / 3.0
+    return Pose(matrix[:3, 3], rotations.nearest_rotation(axes), scale)  # free of float32's rounding
 
 
 def camera_velocity(
@@ -454,11 +452,13 @@ def read(
     length_of_m = hole_settings.mass_scale * hole_pose.scale
 
     spin = float(hole_settings.spin)
-    position = _row(world_to_hole @ (camera_pose.position - hole_pose.position) / length_of_m)
+    position = _row(rotations.times(world_to_hole, camera_pose.position - hole_pose.position) / length_of_m)
     velocity = (0.0, 0.0, 0.0)
     if hole_settings.motion == CAMERA_ANIMATION and measured:
         layer = scene.view_layers.get(depsgraph.view_layer.name) or scene.view_layers[0]
-        seen = world_to_hole @ camera_velocity(scene, hole, camera, layer) / hole_settings.speed_of_light
+        seen = (
+            rotations.times(world_to_hole, camera_velocity(scene, hole, camera, layer)) / hole_settings.speed_of_light
+        )
         velocity = _local_velocity(spin, position, _row(seen), scene.frame_current, camera)
 
     settings = scene.umbra
@@ -467,7 +467,7 @@ def read(
         spin=spin,
         camera=camera_model(evaluated_camera.data, scene.render, scene.render.engine, traits),
         camera_position=position,
-        camera_to_hole=_rows(world_to_hole @ camera_pose.rotation),
+        camera_to_hole=_rows(rotations.times(world_to_hole, camera_pose.rotation)),
         hole_to_world=_rows(hole_pose.rotation),
         motion=MOTIONS[hole_settings.motion],
         velocity=velocity,

@@ -110,6 +110,11 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=lambda settings, _context: _refresh(settings),
     )
+    map_names: bpy.props.StringProperty(
+        name="Map Names",
+        description="What the names of this scene's maps begin with, as of the saved file",
+        options={"HIDDEN"},
+    )
     supersampling: bpy.props.EnumProperty(
         name="Samples",
         description="Rays a pixel, across and down. The shadow's edge is smooth in any case; more samples "

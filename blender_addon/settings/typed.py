@@ -60,6 +60,7 @@ class SceneSettings(_Group):
     foreground_scene: bpy.types.Scene | None
     cpu_fallback: bool
     map_folder: str
+    map_names: str
     supersampling: str
     quality: str
     tolerance: float

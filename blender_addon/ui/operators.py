@@ -47,6 +47,7 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         hole.umbra.spin = self.spin
         hole.umbra.mass_scale = self.mass_scale
         context.collection.objects.link(hole)
+        context.view_layer.update()  # which finds the new object
         if hole.name not in context.view_layer.objects:  # that collection is excluded here
             context.collection.objects.unlink(hole)
             scene.collection.objects.link(hole)

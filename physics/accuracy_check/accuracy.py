@@ -65,6 +65,8 @@ class _Pixels:
     """A map of either kind, as far as it is judged."""
 
     parameters: WarpMapParameters
+    hash: str
+    """From the file's header."""
     direction: NDArray[np.float32]
     """Unit vectors of the sky in the map's own axes, (height, width, 3)."""
     one_plus_z: NDArray[np.float32]
@@ -158,7 +160,7 @@ def accuracy_steps(
         )
     pixels = _read(path)
     pixels.parameters.validate()
-    disk = [_read_pass(each, path, pixels.parameters) for each in passes]
+    disk = [_read_pass(each, path, pixels.hash) for each in passes]
     share = 0.25 if disk else 1.0 / 3.0
     chosen = yield from _portion(choose(pixels.kind, pixels.kind == SKY, pixels.direction, samples, seed), 0.0, share)
     visibility = yield from _portion(_visibility(pixels.parameters, chosen), share, share)
@@ -189,7 +191,14 @@ def _read(path: PathLike) -> _Pixels:
         parameters = WarpMapParameters.from_metadata(exit_map.metadata["parameters"])
         lost = exit_map.counts["unresolved"]
         return _Pixels(
-            parameters, exit_map.direction, exit_map.one_plus_z, seen.astype(np.float32), kind, exit_map.impact, lost
+            parameters,
+            exit_map.metadata["hash"],
+            exit_map.direction,
+            exit_map.one_plus_z,
+            seen.astype(np.float32),
+            kind,
+            exit_map.impact,
+            lost,
         )
     warp_map = read_warp_map(path)
     kind = np.full(warp_map.visibility.shape, EDGE, np.uint8)
@@ -201,12 +210,13 @@ def _read(path: PathLike) -> _Pixels:
         direction[row] = unit_vectors(theta, phi)
     parameters = WarpMapParameters.from_metadata(warp_map.metadata["parameters"])
     lost = int(np.count_nonzero(kind == LOST))
-    return _Pixels(parameters, direction, warp_map.one_plus_z, warp_map.visibility, kind, None, lost)
+    identity = warp_map.metadata["hash"]
+    return _Pixels(parameters, identity, direction, warp_map.one_plus_z, warp_map.visibility, kind, None, lost)
 
 
-def _read_pass(path: PathLike, map_path: PathLike, parameters: WarpMapParameters) -> DiskPass:
+def _read_pass(path: PathLike, map_path: PathLike, identity: str) -> DiskPass:
     one = read_disk_pass(path)
-    if one.metadata["hash"] != parameters.hash:
+    if one.metadata["hash"] != identity:
         raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.", code="map.passes-mixed")
     return one
 
@@ -335,7 +345,7 @@ def _report(
     even = samples.even[compared]
     return AccuracyReport(
         map=Path(path).name,
-        hash=pixels.parameters.hash,
+        hash=pixels.hash,
         size=(pixels.kind.shape[1], pixels.kind.shape[0]),
         samples=len(samples),
         compared=int(compared.sum()),

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 from ..images.exr import PathLike, read_exr_header
 from ..images.exr_header import MAGIC
 from ..numerics.errors import ImageFileError, WarpMapError
+from ..shot.identity import is_hash_of
+from ..shot.map_parameters import WarpMapParameters
 from . import disk_pass_file, exit_map_file, warp_map_file, world_map_file
 from .map_file import ATTRIBUTE_FORMAT, MapFormat
 
@@ -45,7 +48,9 @@ class Finding:
     """What is wrong, as the beginning of a sentence; empty if nothing is."""
 
 
-def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, thorough: bool = True) -> Finding:
+def check_map(
+    path: PathLike, kind: MapFormat, wanted: WarpMapParameters | str | None = None, *, thorough: bool = True
+) -> Finding:
     """Find out what a map's file is.
 
     Parameters
@@ -53,8 +58,9 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
     path : path
     kind : MapFormat
         What the file should be.
-    wanted : str, optional
-        The hash of the parameters that it should be made from; without it, any will do.
+    wanted : WarpMapParameters or str, optional
+        What it should be made from, give or take the noise of single-precision arithmetic, or exactly this hash;
+        without it, any parameters will do.
     thorough : bool
         Whether to read and check the pixels too (some 0.1 s in full HD), and not only the header.
 
@@ -78,7 +84,7 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
         if stamp != kind.stamp:
             return Finding(State.STALE, f"{path} is {kind.noun} of another version ({stamp})")
         metadata = kind.read_metadata(path)
-        if wanted is not None and metadata["hash"] != wanted:
+        if wanted is not None and not _is_made_from(metadata, wanted):
             return Finding(State.STALE, f"The {noun} {path} is out of date")
         if thorough:
             READERS[kind](path)
@@ -89,6 +95,16 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
     except OSError as error:
         return Finding(State.DAMAGED, f"Cannot read {path}: {(error.strerror or str(error)).lower()}")
     return Finding(State.VALID)
+
+
+def _is_made_from(metadata: Mapping[str, Any], wanted: WarpMapParameters | str) -> bool:
+    """Whether a map is one of this version, made from these parameters."""
+    if isinstance(wanted, str):
+        return bool(metadata["hash"] == wanted)
+    if metadata["hash"] == wanted.hash:
+        return True
+    made = metadata["parameters"]
+    return is_hash_of(metadata["hash"], made) and wanted.agrees_with(made)
 
 
 def stamp_kind(stamp: object) -> MapFormat | None:

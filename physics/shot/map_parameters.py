@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from dataclasses import asdict, dataclass
@@ -20,6 +19,7 @@ from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import spherical_triad
 from .cameras import CAMERAS, Camera
 from .disk import Disk
+from .identity import agree, hash_of
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -35,9 +35,6 @@ LARGEST_INTERPOLATION = 1e-2
 
 # Rotations that come from single-precision matrices are orthonormal to about this.
 ROTATION_TOLERANCE = 1e-4
-
-# Raised whenever the same parameters would give other pixels, so that maps baked before count as stale.
-BAKE_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -186,9 +183,23 @@ class WarpMapParameters:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256, in hexadecimal, of all parameters and of the version of what is made from them."""
-        text = json.dumps({"bake_version": BAKE_VERSION, **self.to_metadata()}, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+        """SHA-256, in hexadecimal, of the rounded parameters and of the version of what is made from them."""
+        return hash_of(self.to_metadata())
+
+    def agrees_with(self, made: dict[str, Any]) -> bool:
+        """Return whether a map that was made from other parameters is the one that these would give.
+
+        Parameters
+        ----------
+        made : dict
+            The ``parameters`` of the map's metadata.
+
+        Returns
+        -------
+        bool
+            Whether they differ by the noise of single-precision arithmetic at most; see `identity.agree`.
+        """
+        return agree(made, self.to_metadata())
 
     def to_metadata(self) -> dict[str, Any]:
         """Return every parameter as plain JSON values."""

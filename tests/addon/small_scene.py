@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -110,6 +111,17 @@ def read(path: Path, exr: ModuleType) -> np.ndarray:
     """Pixels of an EXR, shape (height, width, channels), row 0 at the top."""
     pixels, _attributes = exr.read_exr(path)
     return pixels
+
+
+def plain_name(path: Path | str) -> str:
+    """The name of a map file without what tells its .blend file and its shot."""
+    return re.sub(r".*?(Scene_Black_Hole)_[0-9a-f]{8}(?=_)", r"\1", Path(path).name)
+
+
+def find_map(folder: Path, name: str) -> Path:
+    """The one map file in a folder that has this plain name."""
+    (path,) = (each for each in folder.glob("*.exr") if plain_name(each) == name)
+    return path
 
 
 def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree:

@@ -294,3 +294,30 @@ def test_racing_processes_make_each_file_once(tmp_path: Path) -> None:
     workers = {log.read_text() for log in logs}
     assert len(workers) > 1, "one process did everything: nothing was raced for"
     assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can be two users")
+@pytest.mark.parametrize("replacing", [False, True])
+def test_a_dead_claim_of_another_user_in_a_shared_folder(target: Path, replacing: bool) -> None:
+    """Where only owners may remove their files, as in /tmp, and a process was killed, or killed while it took over."""
+    target.parent.chmod(0o1777)
+    left = [leave(claim_path(target), claim.STALE_AFTER + 5.0)]
+    if replacing:
+        left.append(leave(successor(target), claim.STALE_AFTER + 5.0))
+    for path in left:
+        path.chmod(0o600)
+        os.chown(path, 12345, 12345)
+    parents = [each for each in target.parents if each.is_relative_to("/tmp")]
+    modes = {each: each.stat().st_mode for each in parents}
+    try:
+        for each in parents:
+            each.chmod(modes[each] | 0o711)
+        os.seteuid(23456)
+        try:
+            with Claims() as claims:
+                assert claims.take(target)
+        finally:
+            os.seteuid(0)
+    finally:
+        for each, mode in modes.items():
+            each.chmod(mode)

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import bpy
 import pytest
-from small_scene import add_hole
+from small_scene import add_hole, find_map
 
 
 @pytest.fixture
@@ -37,13 +37,13 @@ def test_bake_status_and_clean(
     folder = tmp_path / "maps"
 
     def path(frame: int) -> Path:
-        return folder / f"Scene_Black_Hole_64x36_{frame:04d}.exr"
+        return find_map(folder, f"Scene_Black_Hole_64x36_{frame:04d}.exr")
 
     damaged = bytearray(path(3).read_bytes())
     damaged[-200] ^= 0xFF
     path(3).write_bytes(damaged)
     path(4).write_text("a text that happens to have this name")
-    leftover = folder / ".Scene_Black_Hole_64x36_0002.abcd_123.tmp.exr"
+    leftover = folder / f".{path(2).stem}.abcd_123.tmp.exr"
     leftover.write_bytes(b"half")
     bystander = folder / "holiday.exr"
     bystander.write_text("not ours")

@@ -311,3 +311,23 @@ def test_a_sky_of_the_artists_own_nodes_stays(
     scene.umbra.environment_image = None
     addon_module("outputs.compositor.compositor_sync").sync_sky(scene)  # nothing is missing
     assert addon_module("outputs.registry").of(scene).sky_problem(scene) is None
+
+
+def test_strips_that_are_not_rendered_do_not_matter(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """Blender renders the scene where all strips are muted, one by one or by channel, or the sequencer is off."""
+    check, refusal = addon_module("outputs.shared.sequencer").check, addon_module("core.errors").SceneError
+    editor = scene.sequence_editor_create()
+    end = {"length": 10} if bpy.app.version >= (5, 0) else {"frame_end": 10}
+    strip = editor.strips.new_effect("Title", "COLOR", 2, 1, **end)
+    with pytest.raises(refusal, match='"Title"'):
+        check(scene)
+    strip.mute = True
+    check(scene)
+    strip.mute = False
+    editor.channels[2].mute = True
+    check(scene)
+    editor.channels[2].mute = False
+    scene.render.use_sequencer = False
+    check(scene)

@@ -8,7 +8,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, links_of, shrink
+from small_scene import add_hole, find_map, links_of, plain_name, shrink
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def hole(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def files(tmp_path: Path) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in sorted((tmp_path / "maps").glob("*.exr"))}
+    return {plain_name(path): path.stat().st_mtime_ns for path in sorted((tmp_path / "maps").glob("*.exr"))}
 
 
 def bake() -> None:
@@ -46,9 +46,9 @@ def test_passes_lie_beside_the_map_and_hold(
         "Scene_Black_Hole_48x27_disk3_0001.exr",
     ]
     physics = addon_module("core.physics_api").physics
-    warp_map = physics.read_warp_map(tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr")
+    warp_map = physics.read_warp_map(find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_0001.exr"))
     for number in (1, 2, 3):
-        one = physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
+        one = physics.read_disk_pass(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk{number}_0001.exr"))
         assert one.metadata["crossing"] == number
         assert one.metadata["hash"] == warp_map.metadata["hash"]
     (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
@@ -110,9 +110,9 @@ def test_a_spoilt_pass_makes_the_frame_stale(
     scene.camera.location.x -= 1.0
     scene.frame_set(1)
     (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
-    assert wanted.path == tmp_path / "maps" / "Scene_Black_Hole_48x27_0001.exr"
+    assert wanted.path == find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_0001.exr")
     assert fault_of(wanted) is None
-    spoil(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk{number}_0001.exr")
+    spoil(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk{number}_0001.exr"))
     fault = fault_of(wanted)
     assert f"disk{number}" in fault
     bake()
@@ -131,7 +131,8 @@ def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
     assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
     physics = addon_module("core.physics_api").physics
     first, second = (
-        physics.read_disk_pass(tmp_path / "maps" / f"Scene_Black_Hole_48x27_disk1_000{frame}.exr") for frame in (1, 2)
+        physics.read_disk_pass(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk1_000{frame}.exr"))
+        for frame in (1, 2)
     )
     seen = first.coverage > 0.0
     assert seen.sum() > 50
@@ -218,7 +219,7 @@ def test_a_missing_pass_is_magenta(
 ) -> None:
     """Where nothing checks: in a Blender whose handlers do not run."""
     bake()
-    (tmp_path / "maps" / "Scene_Black_Hole_48x27_disk2_0001.exr").unlink()
+    find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_disk2_0001.exr").unlink()
     handlers = addon_module("render.handlers")
     handlers.unregister()
     try:

@@ -349,10 +349,11 @@ def test_strips_that_move_the_look_are_refused(
 
 
 def test_names_that_look_like_an_exit_maps(scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]) -> None:
-    request = addon_module("bake.request")
+    names, kinds = addon_module("bake.names"), addon_module("bake.kinds")
     scene.name = "Airlock_exit_corridor"
-    pattern = request.name_pattern(scene, "Hole")
-    warp_map = pattern.fullmatch("Airlock_exit_corridor_Hole_64x36_0001.exr")
-    exit_map = pattern.fullmatch("Airlock_exit_corridor_Hole_64x36_0001_exit_0123456789ab.exr")
-    assert request.kind_of(warp_map) is request.WARP_MAP
-    assert request.kind_of(exit_map) is request.EXIT_MAP
+    shot = names.shot_name(scene, "Hole")
+    pattern = names.name_pattern(shot)
+    warp_map = pattern.fullmatch(f"{shot}_64x36_0001.exr")
+    exit_map = pattern.fullmatch(f"{shot}_64x36_0001_exit_0123456789ab.exr")
+    assert names.kind_of(warp_map) is kinds.WARP_MAP
+    assert names.kind_of(exit_map) is kinds.EXIT_MAP

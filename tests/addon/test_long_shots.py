@@ -248,3 +248,19 @@ def test_a_frame_that_is_being_baked_is_not_cleaned_away(
     os.utime(claim, (1.0, 1.0))  # its machine has been off for years
     assert command.run(["clean", "--all"]) == 0
     assert not list(path.parent.iterdir())
+
+
+def test_leftovers_of_valid_maps_go_when_a_bake_finds_them(
+    blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    """A process was killed between writing a map and giving its claim back, and another while it wrote it again."""
+    scene, command = bpy.context.scene, addon_module("command.command_line")
+    assert command.run(["bake", "--frames", "1-2"]) == 0
+    path = addon_module("outputs.frames").requests_at(scene, 1)[0].path
+    dead = claim_elsewhere(path, addon_module("bake.claim"))
+    os.utime(dead, (1.0, 1.0))
+    path.with_name(f".{path.stem}.abcdefgh.tmp.exr").write_bytes(b"half")
+    stamp = path.stat().st_mtime_ns
+    assert command.run(["bake", "--frames", "1-2"]) == 0
+    assert not hidden(path.parent)
+    assert path.stat().st_mtime_ns == stamp

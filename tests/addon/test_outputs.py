@@ -10,7 +10,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, links_of, render, world_sky
+from small_scene import add_hole, links_of, plain_name, render, world_sky
 
 PLAIN = (0.25, 0.5, 0.75)
 
@@ -19,7 +19,7 @@ PLAIN = (0.25, 0.5, 0.75)
 def flat(addon_module: Callable[[str], ModuleType]) -> Iterator[object]:
     """An output that shows an even sky, darker where the frame's map says so: all that an output needs."""
     protocol, registry = addon_module("outputs.protocol"), addon_module("outputs.registry")
-    requests = addon_module("bake.request")
+    requests, kinds = addon_module("bake.request"), addon_module("bake.kinds")
     errors = addon_module("core.errors")
 
     class FlatOutput(protocol.Output):
@@ -48,7 +48,7 @@ def flat(addon_module: Callable[[str], ModuleType]) -> Iterator[object]:
             return True
 
         def map_requests(self, scene: bpy.types.Scene, frame: object) -> list[object]:
-            return [requests.request(scene, frame, requests.WARP_MAP, frame.parameters)]
+            return [requests.request(scene, frame, kinds.WARP_MAP, frame.parameters)]
 
         def take_away(self, scene: bpy.types.Scene) -> None:
             self._show(scene, (1.0, 0.0, 1.0))
@@ -95,7 +95,7 @@ def test_a_fourth_output_in_one_file(
     assert scene.umbra.output == "FLAT"
     picture = render(scene, tmp_path / "flat.exr", exr)
     np.testing.assert_allclose(picture[..., :3], np.broadcast_to(PLAIN, picture[..., :3].shape), rtol=1e-6)
-    assert [each.name for each in (tmp_path / "maps").iterdir()] == ["Scene_Black_Hole_64x36_0001.exr"]
+    assert [plain_name(each) for each in (tmp_path / "maps").iterdir()] == ["Scene_Black_Hole_64x36_0001.exr"]
     text = " ".join(line.text for line in addon_module("ui.status").lines(bpy.context))
     assert "1 of 3 frames baked" in text
     scene.umbra.output = "COMPOSITOR"

@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, read, render, shrink
+from small_scene import add_hole, plain_name, read, render, shrink
 
 Run = Callable[[str], int]
 
@@ -107,7 +107,7 @@ def test_a_write_that_fails_half_way(
     assert run("bake") == 1
     assert "Frame 2: " in (error := capfd.readouterr().err)
     assert "free some space" in error
-    assert files(tmp_path / "maps") == ["Scene_Black_Hole_64x36_0001.exr"]
+    assert [plain_name(each) for each in files(tmp_path / "maps")] == ["Scene_Black_Hole_64x36_0001.exr"]
     assert run("bake") == 0
     assert len(files(tmp_path / "maps")) == 3
 

@@ -14,6 +14,8 @@ from small_scene import (
     add_hole,
     environment_image,
     environment_pixels,
+    find_map,
+    plain_name,
     read,
     render,
     run_python,
@@ -60,7 +62,7 @@ def test_one_click_and_render(
     assert bpy.ops.umbra.add_black_hole() == {"FINISHED"}
     picture = render(scene, tmp_path / "picture.exr", exr)
     (name,) = map_files(tmp_path)
-    assert name == "Scene_Black_Hole_64x36_0001.exr"
+    assert plain_name(name) == "Scene_Black_Hole_64x36_0001.exr"
     warp_map = physics.read_warp_map(tmp_path / "maps" / name)
     expected = reference.render_reference(warp_map, environment_pixels(), foreground=foreground)
     np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
@@ -165,10 +167,12 @@ def test_an_animation_with_marker_cameras(
     scene.render.filepath = str(tmp_path / "frame_####")
     bpy.ops.render.render(animation=True)
     assert scene.frame_current == 7
-    assert list(map_files(tmp_path)) == [f"Scene_Black_Hole_64x36_{frame:04d}.exr" for frame in range(4)]
+    assert [plain_name(each) for each in map_files(tmp_path)] == [
+        f"Scene_Black_Hole_64x36_{frame:04d}.exr" for frame in range(4)
+    ]
     distances = []
     for frame in range(4):
-        warp_map = physics.read_warp_map(tmp_path / "maps" / f"Scene_Black_Hole_64x36_{frame:04d}.exr")
+        warp_map = physics.read_warp_map(find_map(tmp_path / "maps", f"Scene_Black_Hole_64x36_{frame:04d}.exr"))
         picture = read(tmp_path / f"frame_{frame:04d}.exr", exr)
         expected = reference.render_reference(warp_map, environment_pixels())
         np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
@@ -194,7 +198,7 @@ def test_unusual_frames(
     scene.frame_set(frame)
     picture = render(scene, tmp_path / "picture.exr", exr)
     (name,) = map_files(tmp_path)
-    assert name == f"Scene_Black_Hole_64x36_{frame % 1_000_000:04d}.exr"
+    assert plain_name(name) == f"Scene_Black_Hole_64x36_{frame % 1_000_000:04d}.exr"
     expected = reference.render_reference(physics.read_warp_map(tmp_path / "maps" / name), environment_pixels())
     np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
 
@@ -213,7 +217,7 @@ def test_the_worlds_rotation_and_strength(
     scene.render.filepath = str(tmp_path / "frame_####")
     bpy.ops.render.render(animation=True)
     for frame, value in ((1, 0.5), (3, 1.5)):
-        warp_map = physics.read_warp_map(tmp_path / "maps" / f"Scene_Black_Hole_64x36_{frame:04d}.exr")
+        warp_map = physics.read_warp_map(find_map(tmp_path / "maps", f"Scene_Black_Hole_64x36_{frame:04d}.exr"))
         expected = reference.render_reference(warp_map, environment_pixels(), rotation=(0.4, -0.3, 1.2), strength=value)
         picture = read(tmp_path / f"frame_{frame:04d}.exr", exr)
         np.testing.assert_allclose(picture[..., :3], expected.image[..., :3], atol=PIXEL_TOLERANCE)
@@ -299,7 +303,7 @@ def test_saving_and_loading(
     blend.parent.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     # the maps that were baked before saving come along
-    adopted = blend.parent / "umbra_maps" / "Scene_Black_Hole_64x36_0001.exr"
+    adopted = find_map(blend.parent / "umbra_maps", "Scene_Black_Hole_64x36_0001.exr")
     assert adopted.is_file()
     stamp = adopted.stat().st_mtime_ns
 
@@ -311,7 +315,7 @@ def test_saving_and_loading(
     assert scene.umbra.active_hole.umbra.motion == "STATIC"
     setup = addon_module("outputs.shared.compositor_tree").find_setup(scene)
     assert setup.group.node_tree["umbra_version"] == addon_module("nodes.black_hole_group").GROUP_VERSION
-    assert setup.map.image.filepath == "//umbra_maps/Scene_Black_Hole_64x36_0001.exr"
+    assert setup.map.image.filepath == f"//umbra_maps/{adopted.name}"
     np.testing.assert_array_equal(render(scene, tmp_path / "after.exr", exr), picture)
     assert adopted.stat().st_mtime_ns == stamp
     assert scene.render.compositor_precision == "FULL"

@@ -354,9 +354,9 @@ def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
     render(scene, tmp_path / "picture.exr", physics.physics)
     (path,) = Path(scene.umbra.map_folder).glob("*.exr")
     assert modules("bake.cache").FolderNames(scene, "Hole").maps == [(path.name, path)]
-    request = modules("bake.request")
-    match = request.name_pattern(scene, "Hole").fullmatch(path.name)
-    assert request.kind_of(match) is request.WORLD_MAP
+    names = modules("bake.names")
+    match = names.name_pattern(names.shot_name(scene, "Hole")).fullmatch(path.name)
+    assert names.kind_of(match) is modules("bake.kinds").WORLD_MAP
 
 
 def test_a_disk_that_is_not_drawn_is_named(

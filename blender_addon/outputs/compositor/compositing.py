@@ -31,6 +31,7 @@ from ..shared.tree_editing import (
     background_layer,
     check_shared,
     give_back,
+    leads_to_picture,
     make_tree,
     output_node,
     remove_tree,
@@ -131,7 +132,7 @@ def _insert(scene: bpy.types.Scene, tree: bpy.types.NodeTree, group: bpy.types.N
         if len(layers) > 1:
             notes.append(f'The sky was put behind render layer "{layer.layer}", the one farthest back.')
         picture = layer.outputs["Image"]
-        fed = [link.to_socket for link in picture.links]
+        fed = [link.to_socket for link in picture.links if leads_to_picture(link.to_node)]
         group.location = (layer.location.x + 300, layer.location.y)
         _link(tree, picture, group.inputs["Render"])
         for socket in fed:

@@ -4,7 +4,8 @@
 import bpy
 
 from ...bake.folder import folder
-from ...bake.request import WARP_MAP, sequence_path
+from ...bake.kinds import WARP_MAP
+from ...bake.names import sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
 from ...scene import environment, frame_setup
@@ -78,13 +79,6 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the map node read no map at all: the picture is magenta until a valid map is in place."""
     _set_map_path(scene, folder(scene).blender_path + NO_MAP)
-
-
-def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
-    """Let the map node read the same files from another folder."""
-    setup = find_setup(scene)
-    if setup is not None and setup.map is not None and setup.map.image is not None:
-        _set_map_path(scene, blender_folder + bpy.path.basename(setup.map.image.filepath))
 
 
 def _set_map_path(scene: bpy.types.Scene, path: str) -> None:

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import WARP_MAP, MapRequest, request
+from ...bake.kinds import WARP_MAP
+from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
@@ -11,7 +12,7 @@ from ...nodes import black_hole_group
 from ...scene import environment
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
-from ..shared import disk_sync, leaving
+from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import check_linked, check_rendered, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
@@ -153,6 +154,7 @@ class CompositorOutput(Output):
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the group read no map, and refuse a compositor that could not show one."""
         compositor_sync.point_at_nothing(scene)
+        sequencer.check(scene)
         check_rendered(scene)
         check_linked(scene)
 
@@ -177,10 +179,6 @@ class CompositorOutput(Output):
     def is_set_up(self, scene: bpy.types.Scene) -> bool:
         """Return whether the group is in the compositor."""
         return find_setup(scene) is not None
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the group read the same files from another folder."""
-        compositor_sync.move_map_path(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""

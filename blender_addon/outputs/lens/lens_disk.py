@@ -11,13 +11,15 @@ import bpy
 import numpy as np
 
 from ...bake.folder import folder
-from ...bake.request import WARP_MAP, MapRequest, request, sequence_path
+from ...bake.kinds import WARP_MAP
+from ...bake.names import sequence_path
+from ...bake.request import MapRequest, request
 from ...core.physics_api import physics
 from ...nodes import disk_group
 from ...scene import frame_setup
 from ..shared import disk_sync, tree_editing
 from ..shared.compositor_tree import find_node, find_tree, has_scene_tree, render_layers
-from ..shared.map_images import NO_MAP, read_sequence
+from ..shared.map_images import NO_MAP
 from . import lens_tree
 
 
@@ -118,21 +120,9 @@ def point_at_passes(scene: bpy.types.Scene) -> None:
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let them read nothing: the picture is magenta until valid passes are in place."""
-    move_passes(scene, folder(scene).blender_path, NO_MAP)
-
-
-def move_passes(scene: bpy.types.Scene, blender_folder: str, name: str | None = None) -> None:
-    """Let them read from another folder, and those of another map where its file's name is given."""
     tree = find_tree(scene)
-    if tree is None:
-        return
-    if name is not None:
-        disk_sync.point_passes(tree, blender_folder + name)
-        return
-    for node, _crossing in disk_sync.passes_of(tree):
-        if node.image is not None:
-            path = blender_folder + bpy.path.basename(node.image.filepath)
-            read_sequence(node, node.image.name, path)
+    if tree is not None:
+        disk_sync.point_passes(tree, folder(scene).blender_path + NO_MAP)
 
 
 def forget_loaded_passes(scene: bpy.types.Scene) -> None:

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ...scene import frame_setup
-from ...scene.frame_setup import Matrix, Vector
+from ...scene.rotations import Matrix, Vector
 from . import lens_disk
 
 # Types that a camera sees.

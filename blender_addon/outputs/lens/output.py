@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import EXIT_MAP, MapRequest, request
+from ...bake.kinds import EXIT_MAP
+from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
@@ -11,7 +12,7 @@ from ...scene import frame_setup
 from ...scene.frame_setup import FrameSetup
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
-from ..shared import disk_sync, leaving
+from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import find_tree
 from ..shared.look import look_of_scene
 from ..shared.tree_editing import check_shared
@@ -122,6 +123,7 @@ class LensOutput(Output):
         """Let neither camera nor disk show anything."""
         lens_sync.break_camera(scene)
         lens_disk.point_at_nothing(scene)
+        sequencer.check(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Give the camera the frame's parameters and its map."""
@@ -154,10 +156,6 @@ class LensOutput(Output):
     def point_at_files(self, scene: bpy.types.Scene) -> None:
         """Let the disk read the passes of the settings that are saved."""
         lens_disk.point_at_passes(scene)
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the disk read the same passes from another folder."""
-        lens_disk.move_passes(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the passes from their files again."""

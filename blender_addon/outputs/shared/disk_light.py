@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core import color_spaces
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.physics_api import physics
 from ...nodes import disk_images
@@ -114,7 +115,10 @@ def _fill(
     mesh.clear_geometry()
     mesh.from_pydata(places.tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
     colors = np.ones((RINGS, SEGMENTS, 4), np.float32)
-    colors[..., :3] = radiance(disk, look, spin, radii, rows)[:, None, :]
+    light = radiance(disk, look, spin, radii, rows)
+    if rows is None:  # a picture's colors are scene-linear already
+        light = color_spaces.to_scene_linear(light)
+    colors[..., :3] = light[:, None, :]
     attribute = mesh.attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "POINT")
     attribute.data.foreach_set("color", colors.ravel())
     mesh.update()

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...bake.request import SEQUENCE_LENGTH
+from ...bake.names import SEQUENCE_LENGTH
+from ...core import color_spaces
 
 # A file that never exists: a frame without a valid map is magenta instead of showing some older map.
 NO_MAP = "no_warp_map_0001.exr"
@@ -23,7 +24,7 @@ def map_image(name: str) -> bpy.types.Image:
     image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP
-    image.colorspace_settings.name = "Non-Color"
+    color_spaces.mark_as_data(image)
     image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
     return image
 

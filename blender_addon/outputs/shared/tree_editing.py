@@ -18,6 +18,16 @@ def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     return outputs[0] if outputs else None
 
 
+def leads_to_picture(node: bpy.types.Node, seen: set[str] | None = None) -> bool:
+    """Whether what goes into a node comes out as the picture, or is looked at: not if it only goes into files."""
+    seen = set() if seen is None else seen
+    if node.type in {"COMPOSITE", "GROUP_OUTPUT", "VIEWER"}:
+        return True
+    seen.add(node.name)
+    after = {link.to_node for socket in node.outputs for link in socket.links if link.to_node.name not in seen}
+    return any(leads_to_picture(each, seen) for each in after)
+
+
 def background_layer(
     socket: bpy.types.NodeSocket, layers: list[bpy.types.Node], seen: set[str]
 ) -> bpy.types.Node | None:

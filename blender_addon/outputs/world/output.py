@@ -3,11 +3,13 @@
 
 import bpy
 
-from ...bake.request import WORLD_MAP, MapRequest, request
+from ...bake.kinds import WORLD_MAP
+from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
+from ..shared import sequencer
 from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
@@ -81,6 +83,7 @@ class WorldOutput(Output):
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the World read no map, and refuse one that is not the lensed one any more."""
         world_sync.point_at_nothing(scene)
+        sequencer.check(scene)
         check_world(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
@@ -97,10 +100,6 @@ class WorldOutput(Output):
         """Let the World read the maps of the settings that are saved."""
         if scene.library is None:
             world_sync.point_at_files(scene)
-
-    def move_maps(self, scene: bpy.types.Scene, blender_folder: str) -> None:
-        """Let the World read the same files from another folder."""
-        world_sync.move_map_path(scene, blender_folder)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""

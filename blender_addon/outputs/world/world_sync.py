@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 
 from ...bake.folder import folder
-from ...bake.request import WORLD_MAP, sequence_path
+from ...bake.kinds import WORLD_MAP
+from ...bake.names import sequence_path
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
@@ -119,13 +120,6 @@ def point_at_files(scene: bpy.types.Scene) -> None:
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the World read no map: it is magenta."""
     _point_at_path(scene, folder(scene).blender_path + NO_MAP)
-
-
-def move_map_path(scene: bpy.types.Scene, blender_folder: str) -> None:
-    """Let the World read the same files from another folder."""
-    image = _file_image(scene)
-    if image is not None:
-        _point_at_path(scene, blender_folder + bpy.path.basename(image.filepath))
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The kinds of map files: what each is read as, and how it is made."""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..core.physics_api import physics
+from ..core.session import SESSION, Life
+
+# What the maps of one bake or render have in common is kept here.
+_baker = SESSION.value(physics.MapBaker, Life.RENDER)
+
+
+def forget_shared_rays() -> None:
+    """Free the memory of what maps have in common, when a bake or a render is over."""
+    _baker.clear()
+
+
+def _warp_map_steps(parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WarpMap]":
+    return (yield from _baker.now.steps(parameters))
+
+
+@dataclass(frozen=True)
+class MapKind:
+    """What a file is read as, and how it is made."""
+
+    noun: str
+    format: "physics.MapFormat"
+    steps: Callable[..., Generator[float, None, Any]]
+    """Bakes a map: yields the fraction done, returns the map."""
+    write: Callable[[Path, Any], None]
+    mark: str = ""
+    """Stands before the frame's number in a file's name."""
+    is_hashed: bool = False
+    """Whether the name ends in the hash of what the map is made from.
+
+    Cycles keeps textures by their names, and a map that is baked again must not be taken for the one before.
+    """
+    has_passes: bool = False
+    """Whether a disk's passes lie beside the map."""
+
+    @property
+    def hash_mark(self) -> str:
+        """What stands before the hash in a file's name."""
+        return f"_{self.noun.partition(' ')[0]}_"
+
+
+def _write_warp_map(path: Path, warp_map: "physics.WarpMap") -> None:
+    """Write a map and its disk's passes; the map comes last, so that where it is valid they are there."""
+    physics.write_disk_passes(path, warp_map.disk_passes)
+    physics.write_warp_map(path, warp_map)
+
+
+WARP_MAP = MapKind("warp map", physics.WARP_MAP_FORMAT, _warp_map_steps, _write_warp_map, has_passes=True)
+EXIT_MAP = MapKind(
+    "exit map", physics.EXIT_MAP_FORMAT, physics.bake_exit_map_steps, physics.write_exit_map, is_hashed=True
+)
+WORLD_MAP = MapKind(
+    "world map", physics.WORLD_MAP_FORMAT, physics.bake_world_map_steps, physics.write_world_map, mark="world_"
+)
+KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP]
+
+PASS_FORMAT = physics.DISK_PASS_FORMAT
