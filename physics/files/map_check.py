@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -65,7 +66,7 @@ def check_map(path: PathLike, kind: MapFormat, wanted: str | None = None, *, tho
     """
     path = Path(path)
     noun = kind.noun.partition(" ")[2]
-    if not path.exists():
+    if not os.path.exists(path):  # also where the path is too long for a file
         return Finding(State.MISSING, f"The {noun} {path} is missing")
     try:
         with path.open("rb") as stream:
