@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import re
@@ -34,6 +35,10 @@ STRUCTURAL_ATTRIBUTES = frozenset(
     "type name version chunkCount tiles".split()
 )
 
+
+# Bytes of a file's name that all common file systems allow, and what `replacing` adds to one.
+LONGEST_NAME = 255
+_ADDED_TO_NAME = len("..abcdefgh.tmp")
 
 # More threads than this bring little: the checksum and the disk remain.
 MOST_THREADS = 8
@@ -83,7 +88,8 @@ def replacing(path: PathLike) -> Iterator[Path]:
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
+        stem = _shortened(target.stem, LONGEST_NAME - _ADDED_TO_NAME - len(os.fsencode(target.suffix)))
+        handle, name = tempfile.mkstemp(prefix=f".{stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise ImageFileError(
@@ -106,6 +112,52 @@ def replacing(path: PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def _shortened(text: str, most: int) -> str:
+    """Return the beginning of a text that takes at most so many bytes in a file's name, without half characters."""
+    while len(os.fsencode(text)) > max(most, 0):
+        text = text[:-1]
+    return text
+
+
+def check_target(path: PathLike) -> None:
+    """Check, without changing anything, that a file can be written at a path, as far as that can be told.
+
+    Parameters
+    ----------
+    path : path
+        Its folder need not be there.
+
+    Raises
+    ------
+    ImageFileError
+        If the path is a folder, if it or its name is too long, or if its folder cannot be made or written.
+    """
+    target = Path(path)
+    try:
+        if os.path.isdir(target):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if any(len(os.fsencode(part)) > LONGEST_NAME for part in target.parts):
+            raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+        with contextlib.suppress(FileNotFoundError):
+            os.lstat(target.with_name("." * (LONGEST_NAME - 1)))  # as long as a temporary name may be
+        folder = next(parent for parent in (target.absolute().parent, *target.absolute().parents) if parent.exists())
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except (OSError, ValueError) as error:
+        reason = _reason(error) if isinstance(error, OSError) else str(error)
+        raise ImageFileError(
+            f"Cannot write {_brief(target)}: {reason}; choose another name or folder.", code="file.not-written"
+        ) from error
+
+
+def _brief(path: Path) -> str:
+    """Return a path as a message shows it: one that is too long, by its end."""
+    text = str(path)
+    return text if len(text) <= LONGEST_NAME else f"...{text[-LONGEST_NAME:]}"
+
+
 def target_of(name: str) -> str | None:
     """Return the name of the file that a temporary file is written for.
 
@@ -117,7 +169,8 @@ def target_of(name: str) -> str | None:
     Returns
     -------
     str or None
-        None if it is not the name of a temporary file of `replacing`.
+        None if it is not the name of a temporary file of `replacing`. Of a name too long to be lengthened, as much as
+        the temporary name holds.
     """
     match = _TEMPORARY.fullmatch(name)
     return None if match is None else match[1] + match[2]
@@ -160,12 +213,21 @@ def write_channels(
         "type": OpenEXR.scanlineimage,
     }
     expected = None
+    for each in channels.values():
+        height, width = each.shape
+        if not exr_header.fits(width, height):
+            raise ImageFileError(
+                f"Cannot write {path}: a picture of {width} x {height} pixels is more than can be read again; make it "
+                "smaller.",
+                code="file.not-written",
+            )
     with replacing(path) as temporary:
         try:
             with _library_threads(), OpenEXR.File(header, dict(channels)) as file:
-                file.write(str(temporary))
+                # Names that are no UTF-8 only go through as bytes.
+                file.write(str(temporary) if is_text(temporary) else os.fsencode(temporary))
             expected = temporary.stat().st_size
-        except RuntimeError as error:
+        except (RuntimeError, ValueError, TypeError) as error:
             raise OSError(f"the EXR writer failed ({error})") from error
         if not expected:
             raise OSError("no space left on the device")
@@ -234,25 +296,52 @@ def read_exr_header(path: PathLike) -> dict[str, Any]:
         return _attributes(file)
 
 
+def read_beginning(path: PathLike, count: int) -> bytes:
+    """Return the first bytes of a file.
+
+    Raises
+    ------
+    ImageFileError
+        If it is missing or cannot be read.
+    """
+    with _file_errors(path), open(path, "rb") as stream:
+        return stream.read(count)
+
+
 @contextlib.contextmanager
-def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
+def _file_errors(path: PathLike) -> Iterator[None]:
     try:
-        data = Path(path).read_bytes() if not header_only else None
-        with io.BytesIO(data) if data is not None else open(path, "rb") as stream:
-            size = stream.seek(0, os.SEEK_END)
-            stream.seek(0)
-            exr_header.check(stream, size, whole=not header_only)
+        yield
     except FileNotFoundError as error:
         raise ImageFileError(f"{path} does not exist.", code="file.missing") from error
     except OSError as error:
-        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.", code="file.no-access") from error
+        raise ImageFileError(f"Cannot read {_brief(Path(path))}: {_reason(error)}.", code="file.no-access") from error
+    except MemoryError as error:
+        raise ImageFileError(f"{path} is larger than the memory that is free.", code="file.memory") from error
+    except ValueError as error:
+        if isinstance(error, ImageFileError):
+            raise
+        raise ImageFileError(f"Cannot read {str(path)!r}: {error}.", code="file.missing") from error  # a zero byte
+
+
+@contextlib.contextmanager
+def _opened(path: PathLike, header_only: bool) -> Iterator[OpenEXR.File]:
+    try:
+        with _file_errors(path):
+            data = Path(path).read_bytes() if not header_only or not is_text(path) else None
+            with io.BytesIO(data) if data is not None else open(path, "rb") as stream:
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(0)
+                exr_header.check(stream, size, whole=not header_only)
     except exr_header.BadHeader as error:
         raise ImageFileError(f"{path} {error}.", code="file.bad-exr") from error
     try:
         source: Any = str(path) if data is None else io.BytesIO(data)
         with OpenEXR.File(source, separate_channels=True, header_only=header_only) as file:
             yield file
-    except (RuntimeError, ValueError, TypeError, MemoryError, UnicodeDecodeError) as error:
+    except MemoryError as error:
+        raise ImageFileError(f"{path} is larger than the memory that is free.", code="file.memory") from error
+    except (RuntimeError, ValueError, TypeError, UnicodeDecodeError) as error:
         if isinstance(error, ImageFileError):
             raise
         detail = str(error).strip() or type(error).__name__
@@ -264,6 +353,15 @@ def _attributes(file: OpenEXR.File) -> dict[str, Any]:
     (left, top), (right, bottom) = (tuple(int(value) for value in corner) for corner in header["dataWindow"])
     kept = {name: value for name, value in header.items() if name not in STRUCTURAL_ATTRIBUTES}
     return {**kept, "size": (right - left + 1, bottom - top + 1)}
+
+
+def is_text(path: PathLike) -> bool:
+    """Return whether a path can be encoded, which a name that is no UTF-8 cannot be."""
+    try:
+        os.fspath(path).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _reason(error: OSError) -> str:
