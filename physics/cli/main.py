@@ -53,12 +53,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         check_numbers(options)
         options.run(options)
     except BlackHoleError as error:
-        return _failed(error.for_user())
+        return _failed(error)
     except MemoryError:
-        return _failed("There is not enough memory; make the picture smaller. [command.memory]")
+        return _failed(BlackHoleError("There is not enough memory; make the picture smaller.", code="command.memory"))
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        return _failed(f"{place}{(error.strerror or str(error)).lower()}. [command.system]")
+        reason = (error.strerror or str(error)).lower()
+        return _failed(BlackHoleError(f"The system refuses: {place}{reason}.", code="command.system"))
     except KeyboardInterrupt:
         console.note(f"\n{interrupts.SENTENCE}")
         return interrupts.STATUS
@@ -81,8 +82,8 @@ def check_numbers(options: argparse.Namespace) -> None:
                 )
 
 
-def _failed(sentence: str) -> int:
-    console.note(f"error: {' '.join(sentence.splitlines())}")
+def _failed(error: BlackHoleError) -> int:
+    console.note(f"error: {' '.join(error.for_user().splitlines())}")
     return 1
 
 
