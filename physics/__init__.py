@@ -6,6 +6,10 @@ file: `shot`, `kerr`, `geodesics`, `sampling`, `disk_passes`, `maps`, `files`; `
 pictures, `accuracy_check` judges them, `cli` is the command line, `images` and `numerics` serve all.
 """
 
+from .numerics import interrupts  # noqa: F401  before all that takes time
+
+# isort: split
+
 from .accuracy_check.accuracy import (
     DEFAULT_ENVIRONMENT_WIDTH,
     accuracy_steps,

@@ -7,6 +7,7 @@ What is judged is the file, pixels that were interpolated included. Definitions 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ from ..images.exr import PathLike, read_exr_header
 from ..maps.painting import UNRESOLVED_ONE_PLUS_Z
 from ..numerics.arrays import Array
 from ..numerics.blocks import BLOCK_SIZE
+from ..numerics.checks import shown
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..numerics.sphere import unit_vectors
 from ..numerics.work import Cancel, Progress, drain
@@ -46,7 +48,8 @@ REFERENCE_STEPS = 20_000
 
 DEFAULT_SAMPLES = 6000
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 1_000_000
-DEFAULT_ENVIRONMENT_WIDTH = 8192
+DEFAULT_ENVIRONMENT_WIDTH, WIDEST_ENVIRONMENT = 8192, 1_000_000_000
+LARGEST_SEED = 2**63 - 1
 
 # Cells along each side of a pixel when the visible share is worked out again: a map has a quarter of them.
 CELLS = 16
@@ -66,7 +69,6 @@ class _Pixels:
 
     parameters: WarpMapParameters
     hash: str
-    """From the file's header."""
     direction: NDArray[np.float32]
     """Unit vectors of the sky in the map's own axes, (height, width, 3)."""
     one_plus_z: NDArray[np.float32]
@@ -150,14 +152,16 @@ def accuracy_steps(
     """
     if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
         raise BlackHoleError(
-            f"The number of samples is {samples}; give it a value between {FEWEST_SAMPLES} and {MOST_SAMPLES}.",
+            f"The number of samples is {shown(samples)}; give it a value between {FEWEST_SAMPLES} and {MOST_SAMPLES}.",
             code="settings.range",
         )
-    if not environment_width >= 1:
+    if not 1 <= environment_width <= WIDEST_ENVIRONMENT:
         raise BlackHoleError(
-            f"The environment's width is {environment_width}; it must be at least 1 pixel.",
+            f"The environment's width is {shown(environment_width)}; it must be 1 to {WIDEST_ENVIRONMENT} pixels.",
             code="settings.range",
         )
+    if not 0 <= seed <= LARGEST_SEED:
+        raise BlackHoleError(f"The seed is {shown(seed)}; give 0 to {LARGEST_SEED}.", code="settings.range")
     pixels = _read(path)
     pixels.parameters.validate()
     disk = [_read_pass(each, path, pixels.hash) for each in passes]
@@ -183,22 +187,16 @@ def _portion(steps: Generator[float, None, Any], start: float, share: float) -> 
 
 
 def _read(path: PathLike) -> _Pixels:
-    stamp = read_exr_header(path).get(ATTRIBUTE_FORMAT) if Path(path).is_file() else None
+    stamp = read_exr_header(path).get(ATTRIBUTE_FORMAT) if os.path.isfile(path) else None
     if isinstance(stamp, str) and stamp.startswith(EXIT_FORMAT.name):
         exit_map = read_exit_map(path)
         seen = (exit_map.direction != 0.0).any(axis=-1)
         kind = np.where(seen, np.uint8(SKY), np.uint8(SHADOW))
         parameters = WarpMapParameters.from_metadata(exit_map.metadata["parameters"])
         lost = exit_map.counts["unresolved"]
+        shares, identity = seen.astype(np.float32), exit_map.metadata["hash"]
         return _Pixels(
-            parameters,
-            exit_map.metadata["hash"],
-            exit_map.direction,
-            exit_map.one_plus_z,
-            seen.astype(np.float32),
-            kind,
-            exit_map.impact,
-            lost,
+            parameters, identity, exit_map.direction, exit_map.one_plus_z, shares, kind, exit_map.impact, lost
         )
     warp_map = read_warp_map(path)
     kind = np.full(warp_map.visibility.shape, EDGE, np.uint8)

@@ -11,6 +11,7 @@ from ..accuracy_check.accuracy import DEFAULT_ENVIRONMENT_WIDTH, DEFAULT_SAMPLES
 from ..files.disk_pass_file import find_pass
 from ..files.warp_map_file import read_warp_map_metadata
 from ..numerics.errors import WarpMapError
+from .console import say
 from .progress import ProgressPrinter
 
 NAME = "accuracy"
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> None:
         seed=options.seed,
         progress=ProgressPrinter(),
     )
-    print(json.dumps(report.to_json(), indent=2) if options.json else report.text())
+    say(json.dumps(report.to_json(), indent=2) if options.json else report.text())
 
 
 def _passes_beside(path: Path) -> list[Path]:

@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
-import sys
+import os
 import time
 from pathlib import Path
 
-from ..files.disk_pass_file import write_disk_passes
+from ..files import disk_pass_file, warp_map_file
+from ..files.disk_pass_file import pass_path, write_disk_pass
 from ..files.warp_map_file import write_warp_map
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
-from ..maps.warp_map import bake
+from ..images.exr import replacing
+from ..maps.warp_map import WarpMap, bake
 from ..numerics.errors import BlackHoleError
 from ..shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
 from ..shot.map_parameters import (
@@ -24,6 +27,8 @@ from ..shot.map_parameters import (
     unstable_orbit_warning,
 )
 from . import disk_options
+from .console import note, say
+from .output_files import check_maps
 from .progress import ProgressPrinter
 
 NAME = "bake"
@@ -69,7 +74,7 @@ def run(options: argparse.Namespace) -> None:
         raise BlackHoleError(
             f"{options.output} does not end in .exr; warp maps are OpenEXR files.", code="command.file-name"
         )
-    if options.output.is_dir():
+    if os.path.isdir(options.output):
         raise BlackHoleError(f"{options.output} is a folder; give the name of a file.", code="command.file-name")
     if not 0.0 <= options.inclination <= 180.0:
         raise BlackHoleError(
@@ -101,22 +106,32 @@ def run(options: argparse.Namespace) -> None:
         disk=disk_options.disk_of(options),
     )
     parameters.validate()
+    count = 0 if parameters.disk is None else parameters.disk.crossings
+    passes = [Path(pass_path(options.output, crossing)) for crossing in range(1, count + 1)]
+    check_maps({options.output: warp_map_file.FORMAT, **dict.fromkeys(passes, disk_pass_file.FORMAT)})
     warning = unstable_orbit_warning(parameters)
     if warning:
-        print(f"note: {warning}", file=sys.stderr)
+        note(f"note: {warning}")
     started = time.perf_counter()
     warp_map = bake(parameters, progress=ProgressPrinter())
-    passes = write_disk_passes(options.output, warp_map.disk_passes)
-    write_warp_map(options.output, warp_map)
-    counts = dict(warp_map.counts)
-    rays = counts.pop("rays") + counts.pop("shared") + counts.pop("disk_rays", 0)
-    lost = counts.pop("disk_unresolved", 0)
-    pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
-    print(f"wrote {options.output} in {time.perf_counter() - started:.1f} s: {pixels} pixels from {rays} rays")
-    unresolved = warp_map.counts["unresolved"]
-    for path in passes:
-        print(f"wrote {path}")
+    with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
+        map_file = together.enter_context(replacing(options.output))
+        for path, one in zip(passes, warp_map.disk_passes, strict=True):
+            write_disk_pass(together.enter_context(replacing(path)), one)
+        write_warp_map(map_file, warp_map)
+        say("\n".join(_summary(options.output, passes, warp_map, time.perf_counter() - started)))
+    lost, unresolved = warp_map.counts.get("disk_unresolved", 0), warp_map.counts["unresolved"]
     if lost:
-        print(f"note: the disk could not be resolved in {lost} pixels and is missing there", file=sys.stderr)
+        note(f"note: the disk could not be resolved in {lost} pixels and is missing there")
     if unresolved:
-        print(f"note: {unresolved} pixels could not be resolved and will show magenta", file=sys.stderr)
+        note(f"note: {unresolved} pixels could not be resolved and will show magenta")
+
+
+def _summary(output: Path, passes: list[Path], warp_map: WarpMap, seconds: float) -> list[str]:
+    """Return what is said of a map that was baked."""
+    counts = dict(warp_map.counts)
+    counts.pop("disk_unresolved", 0)
+    rays = counts.pop("rays") + counts.pop("shared") + counts.pop("disk_rays", 0)
+    pixels = ", ".join(f"{count} {name}" for name, count in counts.items())
+    first = f"wrote {output} in {seconds:.1f} s: {pixels} pixels from {rays} rays"
+    return [first, *(f"wrote {path}" for path in passes)]

@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import math
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from ..images.exr_library import exr_library
+from ..numerics import interrupts
 from ..numerics.errors import BlackHoleError
-from . import accuracy_command, bake_command, render_command, verify_command
+from . import accuracy_command, bake_command, console, render_command, verify_command
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 
 class Command(Protocol):
@@ -43,24 +47,62 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit status: 0 done; 1 failed, with a sentence on standard error; 130 stopped by Ctrl-C. Wrong usage ends
         the process with 2.
     """
-    options = make_parser().parse_args(arguments)
     try:
+        interrupts.raise_again()
+        console.allow_any_name()
+        options = make_parser().parse_args(arguments)
+        check_numbers(options)
         exr_library()  # before minutes of work
         options.run(options)
     except BlackHoleError as error:
-        print(f"error: {error.for_user()}", file=sys.stderr)
-        return 1
+        return _failed(error)
+    except MemoryError:
+        return _failed(BlackHoleError("There is not enough memory; make the picture smaller.", code="command.memory"))
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        reason = (error.strerror or str(error)).lower()
+        return _failed(BlackHoleError(f"The system refuses: {place}{reason}.", code="command.system"))
     except KeyboardInterrupt:
-        print("\ncanceled: nothing was written", file=sys.stderr)
-        return 130
+        console.note(f"\n{interrupts.SENTENCE}")
+        return interrupts.STATUS
     return 0
+
+
+def check_numbers(options: argparse.Namespace) -> None:
+    """Check that all numbers among the options are finite.
+
+    Raises
+    ------
+    BlackHoleError
+        If one is not.
+    """
+    for name, value in vars(options).items():
+        for number in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(number, float) and not math.isfinite(number):
+                raise BlackHoleError(
+                    f"--{name.replace('_', '-')} is {number:g}; give a finite number.", code="settings.range"
+                )
+
+
+def _failed(error: BlackHoleError) -> int:
+    console.note(f"error: {' '.join(error.for_user().splitlines())}")
+    return 1
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says so where its help cannot be printed."""
+
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        """Print the help, by default on standard output."""
+        if file is None:
+            console.say(self.format_help().rstrip("\n"))
+        else:
+            super().print_help(file)
 
 
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser, with a subparser for each of `COMMANDS`."""
-    parser = argparse.ArgumentParser(
-        prog="python -m physics", description="Warp maps of a spinning black hole, without Blender."
-    )
+    parser = Parser(prog="python -m physics", description="Warp maps of a spinning black hole, without Blender.")
     commands = parser.add_subparsers(required=True, metavar="command")
     for command in COMMANDS:
         subparser = commands.add_parser(

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import sys
 
+from .console import note
+
 
 class ProgressPrinter:
     """Prints the fraction done: as a line that is rewritten on a terminal, at every tenth elsewhere."""
 
     def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._shown = -1
 
     def __call__(self, fraction: float) -> None:
@@ -23,4 +25,4 @@ class ProgressPrinter:
         self._shown = percent
         end = "\n" if percent >= 100 or not self._terminal else ""
         start = "\r" if self._terminal else ""
-        print(f"{start}tracing {percent} %", end=end, file=sys.stderr, flush=True)
+        note(f"{start}tracing {percent} %", end=end)

@@ -5,18 +5,22 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from ..files.warp_map_file import read_warp_map
-from ..images.exr import read_exr, write_exr
+from ..files.disk_pass_file import find_pass
+from ..files.warp_map_file import read_warp_map, read_warp_map_metadata
+from ..images.exr import replacing, write_exr
+from ..images.picture import read_picture
 from ..images.png import write_png
+from ..light.color import redshift_gain
 from ..light.sky_settings import RENDER_ARGUMENTS, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
 from ..reference.reference_render import render
 from . import disk_options
+from .console import note, say
+from .output_files import check_picture
 
 NAME = "render"
 HELP = "make the picture of a warp map over an equirectangular sky"
@@ -30,7 +34,7 @@ PICTURE_ENDINGS = (".png", ".exr")
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("map", metavar="MAP.exr", type=Path)
-    parser.add_argument("sky", metavar="SKY.exr", type=Path)
+    parser.add_argument("sky", metavar="SKY", type=Path, help="EXR; also .hdr, .png or .jpg")
     parser.add_argument("output", metavar="PICTURE.png|exr", type=Path)
     parser.add_argument(
         "--rotation", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"), help="of the sky, degrees"
@@ -60,23 +64,26 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.output.suffix.lower() not in PICTURE_ENDINGS:
         raise BlackHoleError(f"{options.output} must end in {' or '.join(PICTURE_ENDINGS)}.", code="command.file-name")
-    if not options.temperature > 0.0:
-        raise BlackHoleError(
-            f"The temperature is {options.temperature:g} K; it must be positive.", code="sky.temperature"
-        )
+    for name in ("exposure", "redshift_color", "redshift_brightness"):
+        problem = SKY_SETTINGS[name].problem(getattr(options, name))
+        if problem is not None:
+            raise BlackHoleError(f"The {SKY_SETTINGS[name].label.lower()} {problem}.", code="settings.range")
+    redshift_gain(1.0, temperature=options.temperature)  # which refuses temperatures that cannot be
+    if options.disk:
+        disk_options.look_of(options)
+    disk = read_warp_map_metadata(options.map)["parameters"].get("disk")
+    passes = [find_pass(options.map, crossing) for crossing in range(1, (disk["crossings"] if disk else 0) + 1)]
+    check_picture(options.output, [options.map, options.sky, *passes])
     warp_map = read_warp_map(options.map)
     camera = warp_map.metadata["parameters"]["camera"]
-    environment, _ = read_exr(options.sky)
+    environment = read_picture(options.sky)
     broken = ~np.isfinite(environment)
     if broken.any():
         count = int(broken.any(axis=-1).sum())
-        print(
-            f"note: {count} pixels of the sky are no finite numbers; they are taken as black or very bright",
-            file=sys.stderr,
-        )
+        note(f"note: {count} pixels of the sky are no finite numbers; they are taken as black or very bright")
         environment = np.nan_to_num(environment, nan=0.0, posinf=BRIGHTEST, neginf=0.0)
     if environment.shape[1] != 2 * environment.shape[0]:
-        print("note: the sky is not twice as wide as high; is it an equirectangular panorama?", file=sys.stderr)
+        note("note: the sky is not twice as wide as high; is it an equirectangular panorama?")
     picture = render(
         warp_map,
         environment,
@@ -85,8 +92,9 @@ def run(options: argparse.Namespace) -> None:
         output_size=(camera["width"], camera["height"]),
     )
     image = disk_options.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
-    if options.output.suffix.lower() == ".png":
-        write_png(options.output, image)
-    else:
-        write_exr(options.output, image.astype("float32"))
-    print(f"wrote {options.output}")
+    with replacing(options.output) as temporary:
+        if options.output.suffix.lower() == ".png":
+            write_png(temporary, image)
+        else:
+            write_exr(temporary, image.astype("float32"))
+        say(f"wrote {options.output}")

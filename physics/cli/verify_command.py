@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ..files.map_check import Finding, State, check_map, stamp_kind
 from ..files.map_file import ATTRIBUTE_FORMAT
 from ..images.exr import read_exr_header, target_of
 from ..numerics.errors import BlackHoleError, ImageFileError
+from .console import say
 
 NAME = "verify"
 HELP = "read maps and disk passes completely, and say which are valid"
@@ -32,26 +34,36 @@ def run(options: argparse.Namespace) -> None:
     """
     counts: Counter[str] = Counter()
     for path in options.paths:
-        folder = path.is_dir()
-        for file in sorted(path.iterdir()) if folder else [path]:
+        folder = os.path.isdir(path)
+        for file in _files_in(path) if folder else [path]:
             if folder and target_of(file.name) is not None:
-                print(f"{file} was left half written, or is being written")
+                say(f"{file} was left half written, or is being written")
                 continue
             if folder and (file.suffix.lower() != ".exr" or file.name.startswith(".")):
                 continue
             found = check_file(file)
             if folder and found.state is State.FOREIGN:
-                print(f"{found.fault}: left out")
+                say(f"{found.fault}: left out")
                 continue
             counts[found.state] += 1
             if found.fault:
-                print(f"{found.state}: {found.fault}")
-    print(", ".join(f"{count} {state}" for state, count in counts.items()) or "no maps")
+                say(f"{found.state}: {found.fault}")
+    say(", ".join(f"{count} {state}" for state, count in counts.items()) or "no maps")
     faulty = counts.total() - counts[State.VALID]
     if faulty:
         raise BlackHoleError(
             f"{faulty} of {counts.total()} files do not hold; bake them again.", code="command.faulty-maps"
         )
+
+
+def _files_in(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise BlackHoleError(
+            f"The folder {folder} cannot be read: {reason}; change its permissions.", code="folder.not-readable"
+        ) from error
 
 
 def check_file(path: Path) -> Finding:

@@ -69,7 +69,7 @@ def find_pass(map_path: PathLike, crossing: int) -> Path:
     """
     path, map_path = Path(pass_path(map_path, crossing)), Path(map_path)
     former = map_path.with_name(f"{map_path.stem}_disk{crossing}{map_path.suffix}")
-    return former if former.is_file() and not path.is_file() else path
+    return former if os.path.isfile(former) and not os.path.isfile(path) else path
 
 
 def write_disk_passes(map_path: PathLike, passes: Iterable[DiskPass]) -> list[Path]:

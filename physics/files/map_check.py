@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,7 +13,7 @@ from typing import Any
 from ..images.exr import PathLike, read_exr_header
 from ..images.exr_header import MAGIC
 from ..numerics.errors import ImageFileError, WarpMapError
-from ..shot.identity import is_hash_of
+from ..shot.identity import hash_of
 from ..shot.map_parameters import WarpMapParameters
 from . import disk_pass_file, exit_map_file, warp_map_file, world_map_file
 from .map_file import ATTRIBUTE_FORMAT, MapFormat
@@ -71,7 +72,7 @@ def check_map(
     """
     path = Path(path)
     noun = kind.noun.partition(" ")[2]
-    if not path.exists():
+    if not os.path.exists(path):  # also where the path is too long for a file
         return Finding(State.MISSING, f"The {noun} {path} is missing")
     try:
         with path.open("rb") as stream:
@@ -104,7 +105,7 @@ def _is_made_from(metadata: Mapping[str, Any], wanted: WarpMapParameters | str) 
     if metadata["hash"] == wanted.hash:
         return True
     made = metadata["parameters"]
-    return is_hash_of(metadata["hash"], made) and wanted.agrees_with(made)
+    return bool(metadata["hash"] == hash_of(made)) and wanted.agrees_with(made)
 
 
 def stamp_kind(stamp: object) -> MapFormat | None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..images.exr import PathLike, read_channels, read_exr_header, write_channels
 from ..numerics.errors import ImageFileError, WarpMapError
+from ..shot.identity import BAKE_VERSION, version_of
 from ..shot.map_parameters import WarpMapParameters
 
 CHANNELS = ("R", "G", "B", "A")
@@ -25,6 +26,10 @@ ATTRIBUTE_HASH = "umbraHash"
 ATTRIBUTE_COUNTS = "umbraCounts"
 ATTRIBUTE_PARAMETERS = "umbraParameters"
 ATTRIBUTE_CHECKSUM = "umbraChecksum"
+ATTRIBUTE_SEAL = "umbraHeaderChecksum"
+
+# What `ATTRIBUTE_SEAL` is not about: itself, and what the pixels are checked by.
+_UNSEALED = (ATTRIBUTE_SEAL, ATTRIBUTE_CHECKSUM)
 
 Planes = Sequence[NDArray[Any]]
 
@@ -69,19 +74,17 @@ class MapFormat:
         ImageFileError
             If the file cannot be written.
         """
-        write_channels(
-            path,
-            dict(zip(CHANNELS, planes, strict=True)),
-            {
-                ATTRIBUTE_FORMAT: self.stamp,
-                ATTRIBUTE_HASH: metadata["hash"],
-                ATTRIBUTE_COUNTS: json.dumps(metadata["counts"]),
-                ATTRIBUTE_PARAMETERS: json.dumps(metadata["parameters"]),
-                ATTRIBUTE_CHECKSUM: checksum(planes),
-                "comments": self.comments,
-                **dict(zip(self.attributes, further, strict=True)),
-            },
-        )
+        header = {
+            ATTRIBUTE_FORMAT: self.stamp,
+            ATTRIBUTE_HASH: metadata["hash"],
+            ATTRIBUTE_COUNTS: json.dumps(metadata["counts"]),
+            ATTRIBUTE_PARAMETERS: json.dumps(metadata["parameters"]),
+            ATTRIBUTE_CHECKSUM: checksum(planes),
+            "comments": self.comments,
+            **dict(zip(self.attributes, further, strict=True)),
+        }
+        header[ATTRIBUTE_SEAL] = seal(header)
+        write_channels(path, dict(zip(CHANNELS, planes, strict=True)), header)
 
     def read(self, path: PathLike) -> tuple[list[NDArray[Any]], dict[str, Any]]:
         """Read the four planes and the metadata, and check header and checksum.
@@ -148,15 +151,22 @@ class MapFormat:
         try:
             parameters = json.loads(header[ATTRIBUTE_PARAMETERS])
             counts = json.loads(header[ATTRIBUTE_COUNTS])
-            width, height = WarpMapParameters.from_metadata(parameters).map_size
-            readable = isinstance(counts["unresolved"], int) and all(type(each) is int for each in counts.values())
-            identity = str(header[ATTRIBUTE_HASH])
-        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+            made_from = WarpMapParameters.from_metadata(parameters)
+            _check(made_from)
+            width, height = made_from.map_size
+            readable = isinstance(counts["unresolved"], int) and all(
+                type(each) is int and each >= 0 for each in counts.values()
+            )
+            identity = identity_of(str(header[ATTRIBUTE_HASH]), made_from, parameters)
+        except (ArithmeticError, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
             raise WarpMapError(
                 advice(f"{Path(path)} is damaged: its header cannot be read."), code="map.damaged"
             ) from error
-        if not readable:
-            raise WarpMapError(advice(f"{Path(path)} is damaged: its header cannot be read."), code="map.damaged")
+        sealed = header.get(ATTRIBUTE_SEAL, seal(header))
+        if not readable or identity is None or sealed != seal(header):
+            raise WarpMapError(
+                advice(f"{Path(path)} is damaged: its header is not the one that was written."), code="map.damaged"
+            )
         if list(header["size"]) != [width, height * self.pictures]:
             raise WarpMapError(
                 advice(f"{Path(path)} is damaged: its size is not that of its parameters."), code="map.damaged"
@@ -182,6 +192,54 @@ def checksum(planes: Planes) -> str:
     for plane in planes:
         value = zlib.crc32(np.ascontiguousarray(plane, dtype="<f4").data, value)
     return f"crc32 {value:08x}"
+
+
+def seal(header: Mapping[str, Any]) -> str:
+    """Return the CRC-32 of the header's own attributes, which finds a bit that flipped in any of them.
+
+    Parameters
+    ----------
+    header : mapping
+        Attributes by name; those of other programs do not count.
+
+    Returns
+    -------
+    str
+        ``crc32`` and eight hexadecimal digits.
+    """
+    own = {name: value for name, value in header.items() if name.startswith("umbra") and name not in _UNSEALED}
+    text = json.dumps({name: value for name, value in own.items() if isinstance(value, str)}, sort_keys=True)
+    return f"crc32 {zlib.crc32(text.encode()):08x}"
+
+
+def identity_of(stated: str, made_from: WarpMapParameters, parameters: Mapping[str, Any]) -> str | None:
+    """Return the hash of what a header says a map was made from, if the header states that hash.
+
+    Parameters
+    ----------
+    stated : str
+        The hash in the header.
+    made_from : WarpMapParameters
+        What its parameters are.
+    parameters : mapping
+        They themselves, as the header has them.
+
+    Returns
+    -------
+    str or None
+        `WarpMapParameters.hash`, also for a file of version 0.1.0, whose hash was of all digits; for a map of another
+        version of the bake the stated hash. None if the hash is not of these parameters.
+    """
+    version = version_of(stated, parameters)
+    if version is None:
+        return None
+    return made_from.hash if version == BAKE_VERSION else stated
+
+
+def _check(made_from: WarpMapParameters) -> None:
+    """Raise BlackHoleError if nothing can be made from these parameters."""
+    with np.errstate(all="ignore"):
+        made_from.validate()
 
 
 def advice(sentence: str) -> str:

@@ -38,7 +38,8 @@ class Crossings:
     u_slope: Array
     """du / dlambda of the ray backwards: u^2 Delta p_r of the light."""
     unwound: Array
-    """Azimuth in the hole's frame, radians, without `radial_path.winding`: regular at the horizon. It counts
+    """Azimuth in the hole's frame, radians, without `radial_path.winding` of the hole itself, which is also that of
+    light of negative energy about the mirrored hole, with its sign: regular at the horizon. It counts
     turns: from ray to ray it jumps, by whole ones, only where b changes sign, as long as no steps are taken."""
     mino_time: Array
     """Mino time from the camera, in 1/M, for energy +-1 at infinity."""

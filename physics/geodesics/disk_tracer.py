@@ -13,7 +13,7 @@ from ..kerr.observer import Observer
 from ..kerr.rays import Rays, camera_directions, rays_from_camera
 from ..numerics.arrays import Array
 from ..numerics.blocks import blocks
-from ..numerics.checks import whole
+from ..numerics.checks import shown, whole
 from ..numerics.errors import BlackHoleError
 from ..numerics.work import Cancel, Progress, drain
 from .crossings import Crossings, LightAtDisk, cross_plane, split_by_energy
@@ -176,7 +176,7 @@ def check_disk_settings(crossings: int, method: str) -> None:
     crossings = whole(crossings, "the number of crossings")
     if not 1 <= crossings <= MOST_CROSSINGS:
         raise BlackHoleError(
-            f"The number of crossings is {crossings}; give it a value between 1 and {MOST_CROSSINGS}.",
+            f"The number of crossings is {shown(crossings)}; give it a value between 1 and {MOST_CROSSINGS}.",
             code="disk.setting",
         )
     if method not in DISK_METHODS:

@@ -3,6 +3,7 @@
 
 The radial motion is u'' = U'(u) / 2 and the polar motion that of the unit vector n, as `mino` has them, with neither
 turning points nor closed forms. A step that takes n_z through zero is taken again, shorter, until it ends on the plane.
+The azimuth is stepped without its winding at the horizon (`radial_path`), which it then passes like any other place.
 Next to the critical curve, where solutions of u'' = U' / 2 part exponentially, rays may end on the wrong side of the
 hole: the closed form knows which side is right, and such rays are UNRESOLVED.
 """
@@ -24,16 +25,19 @@ from ..numerics.sphere import spherical_triad
 from .crossings import Crossings
 from .mino import FIRST_ANGLE, radial_polynomial
 from .polar import IN_PLANE
-from .radial_path import HORIZON_MARGIN, winding
+from .radial_path import HORIZON_MARGIN, energy_sense, winding
 from .tracer import Fate
 
-# Rows of the state: 1 / r, its derivative, the unit vector n, its derivative, the extra rotation psi, the Mino time.
+# Rows of the state: 1 / r, its derivative, the unit vector n, its derivative, psi without its winding, the Mino time.
 U, U_PRIME, N, N_PRIME, PSI, TIME = 0, 1, slice(2, 5), slice(5, 8), 8, 9
 N_Z, N_Z_PRIME = 4, 7
 N_COMPONENTS = 10
 
 # Errors of single steps add up and are amplified on the way: steps are held to this share of the tolerance.
 STEP_SHARE = 1e-3
+
+# How far a step may lead, as a multiple of the straight way to the horizon.
+PAST_HORIZON = 1.2
 
 # Rounds of Newton's method that end a step on the plane.
 REFINEMENTS = 4
@@ -53,47 +57,55 @@ class PlaneWatcher:
         state[N_Z, np.abs(state[N_Z]) < IN_PLANE] = 0.0
         pace = np.sqrt(np.maximum(rays.q_plus_b2 + rays.spin**2, 0.0))
         state[N_Z_PRIME, np.abs(state[N_Z_PRIME]) < IN_PLANE * pace] = 0.0
+        sense, a = energy_sense(rays), rays.spin
+        state[PSI] = -sense * winding(a, state[U])
         self.state = state
         self.places = np.full((count, N_COMPONENTS, len(rays)), np.nan)
         self.found = np.zeros(len(rays), dtype=np.intp)
         self._spin = rays.spin
         self._last_u = 1.0 / (horizon_radius(rays.spin) * HORIZON_MARGIN)
-        self._constants = np.vstack([*radial_polynomial(rays), rays.q_plus_b2, rays.b, 1.0 / (pace + 1.0)])
+        carter_k = rays.q_plus_b2 + a * (a - 2.0 * rays.b)
+        self._constants = np.vstack(
+            [*radial_polynomial(rays), rays.q_plus_b2, 1.0 / (pace + 1.0), rays.b, carter_k, sense]
+        )
         self._ray = np.arange(len(rays))
         self._before = state.copy()
 
     def derivative(self, state: Array, out: Array) -> None:
         """Write d state / d lambda along the backward ray to `out`."""
-        c2, c3, c4, q_plus_b2, b, _ = self._constants
+        c2, c3, c4, q_plus_b2, _, b, carter_k, sense = self._constants
         a, u, n_z = self._spin, state[U], state[N_Z]
         out[U] = state[U_PRIME]
         out[U_PRIME] = u * (c2 + u * (1.5 * c3 + 2.0 * c4 * u))
         out[N] = state[N_PRIME]
         out[N_PRIME] = -(q_plus_b2 + 2.0 * a * a * n_z * n_z) * state[N]
         out[N_Z_PRIME] += a * a * n_z
-        outer = horizon_radius(a)
+        square, outer = u * u, horizon_radius(a)
+        total = sense * (1.0 + a * (a - b) * square) + np.abs(state[U_PRIME])
+        delta = (1.0 - outer * u) * (1.0 - (a * a / outer) * u)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            out[PSI] = a * u * (a * b * u - 2.0) / ((1.0 - outer * u) * (1.0 - (a * a / outer) * u))
+            share = np.where(state[U_PRIME] > 0.0, carter_k * square / total, total / delta)
+        out[PSI] = a - sense * a * share
         out[TIME] = 1.0
 
     def error(self, difference: Array, state: Array, slope: Array) -> Array:
         """Return the error of direction, in radians, that `difference` amounts to; shape (n,)."""
-        size, pace = np.abs(difference), self._constants[5]
+        size, pace = np.abs(difference), self._constants[4]
         total: Array = size[N].max(axis=0) + size[N_PRIME].max(axis=0) * pace + size[PSI]
         total += size[U] / np.minimum(state[U] + pace, 1.0) + size[U_PRIME] * pace
         return total
 
     def first_step(self) -> Array:
         """Return a first step in Mino time, shape (n,)."""
-        step: Array = 0.1 * FIRST_ANGLE * self._constants[5]
+        step: Array = 0.1 * FIRST_ANGLE * self._constants[4]
         return step
 
     def limit(self, state: Array, slope: Array, step: Array) -> Array:
-        """Return `step` cut so that psi' stays finite: the horizon is approached by tenths of the way left."""
+        """Return `step` cut so that it ends not far inside the horizon."""
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(slope[U] > 0.0, (self._last_u - state[U]) / slope[U], np.inf)
-            left = np.where(left < 0.05 * step, left + 1e-6 * step, 0.5 * left)
-        return np.where(self._spin == 0.0, step, np.minimum(step, np.maximum(left, 0.0)))
+        cut: Array = np.minimum(step, PAST_HORIZON * np.maximum(left, 0.0))
+        return cut
 
     def ended(self, state: Array) -> Mask:
         """Return which rays have come to infinity or to the horizon, and note what they crossed on the way."""
@@ -147,9 +159,10 @@ def step_to_plane(rays: Rays, count: int, tolerance: float, max_steps: int) -> C
         pass
     assert outcome is not None
     sky = comes_from_sky(rays)
-    ended = outcome.reached & ((outcome.state[U] <= 0.0) == sky)
+    astray = outcome.reached & ((outcome.state[U] <= 0.0) != sky)
     places = np.moveaxis(watcher.places, 1, 0)
-    places[:, :, ~ended] = np.nan
+    places[:, :, astray] = np.nan  # what was found of rays that ran out of steps is kept
+    ended = outcome.reached & ~astray
     fate = np.where(ended, np.where(sky, Fate.SKY, Fate.SHADOW), Fate.UNRESOLVED).astype(np.uint8)
-    unwound = np.arctan2(places[3], places[2]) + places[PSI] - winding(rays.spin, places[U])
+    unwound = np.arctan2(places[3], places[2]) + places[PSI]
     return Crossings(places[U], places[U_PRIME], unwound, places[TIME], fate)

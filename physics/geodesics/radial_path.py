@@ -23,6 +23,8 @@ p^2 - S^2 = (1 - 2 u + a^2 u^2)(q + (b - a)^2) u^2,
     psi' = +- W'(u) S + a - a (q + (b - a)^2) u^2 / (p + S),
 
 the upper sign for rays on their way in. What is left of W is regular at the horizon, and that is what is integrated.
+p > 0 for light of positive energy; for that of negative energy, whose hole is mirrored (`negative_energy_rays`), p < 0
+all along the ray, as p^2 > S^2 outside the horizon. Then W has the other sign, and p + S becomes p - S.
 """
 
 from __future__ import annotations
@@ -104,6 +106,8 @@ class RadialPath:
     """About where x' has a singularity next to x = 0, at +-i near."""
     pace: Array
     """How fast the ray's direction turns, radians per Mino time."""
+    sense: Array
+    """The sign of p: that of the light's energy."""
 
     def select(self, chosen: Index) -> RadialPath:
         """Return the path of the chosen rays alone."""
@@ -151,11 +155,11 @@ class RadialPath:
             plain: Array = a * u * (a * self.b * u - 2.0) / self._delta(u)
             return plain
         slope = self.unit * speed * (2.0 * np.abs(x) if self.squared else 1.0)
-        p = 1.0 + a * (a - self.b) * u * u
-        rate: Array = a - a * self.carter_k * u * u / (p + slope)
+        total = self.sense * (1.0 + a * (a - self.b) * u * u) + slope
+        rate: Array = a - self.sense * a * self.carter_k * u * u / total
         if self.squared:
             # before the turning point the ray goes out
-            rate = np.where(x < 0.0, a - a * (p + slope) / self._delta(u), rate)
+            rate = np.where(x < 0.0, a - self.sense * a * total / self._delta(u), rate)
         return rate
 
     def _delta(self, u: Array) -> Array:
@@ -168,6 +172,18 @@ class RadialPath:
     def wound(self) -> float:
         """How many times W is taken out of psi: 1 for rays that end at the horizon, -1 for those straight out."""
         return 0.0 if self.squared and self.sign < 0.0 else self.sign
+
+
+def energy_sense(rays: Rays) -> Array:
+    """Return the sign of p = 1 + a (a - b) u^2 along rays, shape (n,): 1, or -1 for light of negative energy.
+
+    Parameters
+    ----------
+    rays : Rays
+        Of a mirrored hole, if their energy is negative.
+    """
+    u = 1.0 / rays.observer.r
+    return np.where(1.0 + rays.spin * (rays.spin - rays.b) * u * u < 0.0, -1.0, 1.0)
 
 
 def winding(spin: float, u: NDArray[Any]) -> NDArray[Any]:
@@ -232,7 +248,8 @@ def _path(rays: Rays, barrier: Barrier, squared: bool, sign: float) -> RadialPat
         far = 1.0 + root / unit
         if squared:
             end, far = np.sqrt(np.maximum(end, 0.0)), np.sqrt(far)
-    return RadialPath(a, squared, sign, rays.b, carter_k, rates, unit, start, end, far, near, pace)
+    sense = energy_sense(rays)
+    return RadialPath(a, squared, sign, rays.b, carter_k, rates, unit, start, end, far, near, pace, sense)
 
 
 def beyond_horizon(spin: float) -> float:
@@ -258,7 +275,7 @@ class Places:
     u_slope: Array
     """du / dlambda along the ray backwards."""
     unwound: Array
-    """psi - W(u): regular at the horizon."""
+    """psi - W(u), or psi + W(u) for light of negative energy: regular at the horizon."""
     resolved: Mask
     """Shape (n,)."""
 
@@ -406,15 +423,15 @@ class _Series:
         return part
 
     def unwound(self, u: Array, z: Array) -> Array:
-        """Return psi - W(u) at z, where u is `u`."""
+        """Return psi without W(u) at z, where u is `u`."""
         path = self.path
         if path.spin == 0.0:
             return np.zeros_like(u)
         total = _clenshaw(self.psi_series, z)
         if path.wound != 0.0:
-            total -= path.wound * winding(path.spin, path.u(path.start))
+            total -= path.wound * path.sense * winding(path.spin, path.u(path.start))
         if path.wound != 1.0:
-            total += (path.wound - 1.0) * winding(path.spin, u)
+            total += (path.wound - 1.0) * path.sense * winding(path.spin, u)
         return total
 
     def places(self, times: Array, tolerance: float) -> Places:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import re
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from ..numerics.errors import ImageFileError
 from . import exr_header
 from .exr_library import library
+from .file_names import LONGEST_NAME, brief, shortened
 
 # At once, before anybody loads another: see `own_symbols`. Whoever needs it hears that there is none.
 with contextlib.suppress(ImageFileError):
@@ -28,6 +30,9 @@ PathLike = str | os.PathLike[str]
 
 # Names of files that are being written, or that a process was writing when it was killed.
 _TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.tmp(\.[^.]+)")
+
+# Bytes that `replacing` adds to a file's name.
+_ADDED_TO_NAME = len("..abcdefgh.tmp")
 
 
 @contextlib.contextmanager
@@ -54,7 +59,8 @@ def replacing(path: PathLike) -> Iterator[Path]:
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
+        stem = shortened(target.stem, LONGEST_NAME - _ADDED_TO_NAME - len(os.fsencode(target.suffix)))
+        handle, name = tempfile.mkstemp(prefix=f".{stem}.", suffix=f".tmp{target.suffix}", dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise ImageFileError(
@@ -77,6 +83,39 @@ def replacing(path: PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_target(path: PathLike) -> None:
+    """Check, without changing anything, that a file can be written at a path, as far as that can be told.
+
+    Parameters
+    ----------
+    path : path
+        Its folder need not be there.
+
+    Raises
+    ------
+    ImageFileError
+        If the path is a folder, if it or its name is too long, or if its folder cannot be made or written.
+    """
+    target = Path(path)
+    try:
+        if os.path.isdir(target):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if any(len(os.fsencode(part)) > LONGEST_NAME for part in target.parts):
+            raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+        with contextlib.suppress(FileNotFoundError):
+            os.lstat(target.with_name("." * (LONGEST_NAME - 1)))  # as long as a temporary name may be
+        folder = next(parent for parent in (target.absolute().parent, *target.absolute().parents) if parent.exists())
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except (OSError, ValueError) as error:
+        reason = _reason(error) if isinstance(error, OSError) else str(error)
+        raise ImageFileError(
+            f"Cannot write {brief(target)}: {reason}; choose another name or folder.", code="file.not-written"
+        ) from error
+
+
 def target_of(name: str) -> str | None:
     """Return the name of the file that a temporary file is written for.
 
@@ -88,7 +127,8 @@ def target_of(name: str) -> str | None:
     Returns
     -------
     str or None
-        None if it is not the name of a temporary file of `replacing`.
+        None if it is not the name of a temporary file of `replacing`. Of a name too long to be lengthened, as much as
+        the temporary name holds.
     """
     match = _TEMPORARY.fullmatch(name)
     return None if match is None else match[1] + match[2]
@@ -126,12 +166,20 @@ def write_channels(
         When the file cannot be written, or there is no library that can.
     """
     exr = library()
+    for each in channels.values():
+        height, width = each.shape
+        if not exr_header.fits(width, height):
+            raise ImageFileError(
+                f"Cannot write {path}: a picture of {width} x {height} pixels is more than can be read again; make it "
+                "smaller.",
+                code="file.not-written",
+            )
     expected = None
     with replacing(path) as temporary:
         try:
             exr.write(str(temporary), channels, attributes or {})
             expected = temporary.stat().st_size
-        except RuntimeError as error:
+        except (RuntimeError, ValueError, TypeError) as error:
             raise OSError(f"the EXR writer failed ({error})") from error
         if not expected:
             raise OSError("no space left on the device")
@@ -203,18 +251,43 @@ def read_exr_header(path: PathLike) -> dict[str, Any]:
         return exr_header.attributes(stream)
 
 
-def _checked(path: PathLike, header_only: bool) -> bytes:
-    """Return a file's bytes, none where only its header is read, if it is a file that can be read."""
+def read_beginning(path: PathLike, count: int) -> bytes:
+    """Return the first bytes of a file.
+
+    Raises
+    ------
+    ImageFileError
+        If it is missing or cannot be read.
+    """
+    with _file_errors(path), open(path, "rb") as stream:
+        return stream.read(count)
+
+
+@contextlib.contextmanager
+def _file_errors(path: PathLike) -> Iterator[None]:
     try:
-        data = Path(path).read_bytes() if not header_only else b""
-        with io.BytesIO(data) if not header_only else open(path, "rb") as stream:
-            size = stream.seek(0, os.SEEK_END)
-            stream.seek(0)
-            exr_header.check(stream, size, whole=not header_only)
+        yield
     except FileNotFoundError as error:
         raise ImageFileError(f"{path} does not exist.", code="file.missing") from error
     except OSError as error:
-        raise ImageFileError(f"Cannot read {path}: {_reason(error)}.", code="file.no-access") from error
+        raise ImageFileError(f"Cannot read {brief(Path(path))}: {_reason(error)}.", code="file.no-access") from error
+    except MemoryError as error:
+        raise ImageFileError(f"{path} is larger than the memory that is free.", code="file.memory") from error
+    except ValueError as error:
+        if isinstance(error, ImageFileError):
+            raise
+        raise ImageFileError(f"Cannot read {str(path)!r}: {error}.", code="file.missing") from error  # a zero byte
+
+
+def _checked(path: PathLike, header_only: bool) -> bytes:
+    """Return a file's bytes, none where only its header is read, if it is a file that can be read."""
+    try:
+        with _file_errors(path):
+            data = Path(path).read_bytes() if not header_only else b""
+            with io.BytesIO(data) if not header_only else open(path, "rb") as stream:
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(0)
+                exr_header.check(stream, size, whole=not header_only)
     except exr_header.BadHeader as error:
         raise ImageFileError(f"{path} {error}.", code="file.bad-exr") from error
     return data
@@ -225,7 +298,9 @@ def _damage_told(path: PathLike) -> Iterator[None]:
     """Turn whatever a library says of a file into one sentence."""
     try:
         yield
-    except (exr_header.BadHeader, struct.error, RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
+    except MemoryError as error:
+        raise ImageFileError(f"{path} is larger than the memory that is free.", code="file.memory") from error
+    except (exr_header.BadHeader, struct.error, RuntimeError, ValueError, TypeError, OSError) as error:
         detail = str(error).strip() or type(error).__name__
         raise ImageFileError(f"{path} is damaged or cut short: {detail}.", code="file.bad-exr") from error
 

@@ -61,6 +61,17 @@ class BadHeader(Exception):
     """What is wrong, as the rest of a sentence that begins with the file's name."""
 
 
+def fits(width: int, height: int) -> bool:
+    """Return whether a picture of this size can be read, and so may be written.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+    """
+    return max(width, height) <= LARGEST_SIDE and width * height <= MOST_PIXELS
+
+
 def check(stream: BinaryIO, size: int, *, whole: bool) -> None:
     """Check an OpenEXR file.
 
@@ -173,7 +184,7 @@ def _check_size(header: Attributes, size: int) -> tuple[int, int]:
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1:
         raise BadHeader("is damaged: its size is not one")
-    if max(width, height) > LARGEST_SIDE or width * height > MOST_PIXELS:
+    if not fits(width, height):
         raise BadHeader(f"is {width} x {height} pixels large, which is more than can be read here")
     if header["displayWindow", "box2i"] != header["dataWindow", "box2i"]:
         raise BadHeader("holds a crop of a larger picture, or one with a margin; save it whole")

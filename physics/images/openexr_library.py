@@ -17,6 +17,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from . import own_symbols
+from .file_names import is_text
 
 NAME = "OpenEXR"
 
@@ -48,7 +49,8 @@ class OpenEXRLibrary:
             "type": self._module.scanlineimage,
         }
         with self._threads(), self._module.File(header, dict(channels)) as file:
-            file.write(path)
+            # Names that are no UTF-8 only go through as bytes.
+            file.write(path if is_text(path) else os.fsencode(path))
 
     def _opened(self, path: str, data: bytes) -> Any:
         try:

@@ -102,6 +102,7 @@ def bake_exit_map_steps(parameters: WarpMapParameters) -> Generator[float, None,
         Before the first step, if no map can be made from these parameters, or the method has no exit lines.
     """
     parameters.validate()
+    parameters.check_size(pictures=2)
     check_exit_method(parameters.method)
     painting = ExitPainting(parameters)
     yield from painting.steps()

@@ -11,9 +11,13 @@ from ..disk_passes.disk_pass import DiskPass
 from ..light.disk_look import shade
 from ..light.disk_settings import DiskLook
 from ..numerics.arrays import Array
+from ..numerics.checks import finite
 from ..numerics.errors import BlackHoleError
 from ..shot.disk import Disk
 from .reference_render import resize
+
+# Beyond this time, units of M, float64 does not tell the phases of orbits.
+LATEST = 1e12
 
 
 def disk_layers(
@@ -51,6 +55,10 @@ def disk_layers(
     ``t *= 1 - alpha``.
     """
     look.validate()
+    if not abs(finite(time, "the time of the disk")) <= LATEST:
+        raise BlackHoleError(
+            f"The time of the disk is {time:g} M; give -{LATEST:g} to {LATEST:g} M.", code="disk.setting"
+        )
     if not passes or len({one.metadata["hash"] for one in passes}) != 1:
         raise BlackHoleError(
             "The disk's passes are not of one map; give all crossings of one bake.", code="map.passes-mixed"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..light.color import DEFAULT_TEMPERATURE, redshift_gain
+from ..numerics.checks import finite, three
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import unit_vectors
 
@@ -31,6 +32,9 @@ LARGEST_ONE_PLUS_Z = 1e6
 ANGLE_SLACK = 1e-5
 """float32 cannot write pi and 2 pi exactly; angles out of range by more than this (radians) are foreign."""
 
+
+MOST_STOPS = 1000.0
+"""Exposures beyond this are no numbers of float64."""
 
 HALVE_ABOVE = 3.0
 """Ratio of widths above which `resize` halves a picture before it interpolates."""
@@ -228,13 +232,19 @@ def render(
     Raises
     ------
     BlackHoleError
-        If shapes do not fit together, or for settings of the redshift that cannot be.
+        If shapes do not fit together, or for a setting that cannot be.
 
     Notes
     -----
     sky = environment(R d) 2^exposure strength gain(1 + z) visibility for each pixel of the map, then the box
     filter, then image = foreground + (1 - alpha) sky. Invalid pixels of the map are magenta in image and sky.
     """
+    rotation = [finite(angle, "the rotation of the sky") for angle in three(rotation, "the rotation of the sky")]
+    strength, stops = finite(strength, "the strength of the sky"), finite(exposure, "the exposure")
+    if not abs(stops) <= MOST_STOPS:
+        raise BlackHoleError(
+            f"The exposure is {stops:g} stops; give -{MOST_STOPS:g} to {MOST_STOPS:g}.", code="settings.range"
+        )
     theta, phi, one_plus_z, visibility = _channels(warp_map)
     sky_picture: FloatArray = np.asarray(environment, dtype=np.float64)
     if sky_picture.ndim != 3 or sky_picture.shape[2] not in (3, 4):
@@ -263,7 +273,7 @@ def render(
     directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
     colors = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
     colors *= redshift_gain(shift, color_amount, brightness_amount, temperature)
-    colors *= (2.0**exposure * strength * seen)[..., np.newaxis]
+    colors *= (2.0**stops * strength * seen)[..., np.newaxis]
     colors[invalid] = MAGENTA
 
     data = np.stack([seen, shift, invalid.astype(np.float64)], axis=-1)

@@ -31,7 +31,8 @@ def _check_size(width: int, height: int) -> None:
     width, height = whole(width, "the picture's width"), whole(height, "the picture's height")
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         raise BlackHoleError(
-            f"The picture's size is {width} x {height}; each side must be between 1 and {LARGEST_SIDE} pixels.",
+            f"The picture's size is {shown(width)} x {shown(height)}; each side must be between 1 and {LARGEST_SIDE} "
+            "pixels.",
             code="camera.size",
         )
 

@@ -29,33 +29,38 @@ NOISE = 4e-7
 _EXACT = frozenset({"tolerance", "interpolation"})
 
 
-def hash_of(values: Mapping[str, Any]) -> str:
+def hash_of(values: Mapping[str, Any], version: int = BAKE_VERSION) -> str:
     """Return the hash of a map's parameters.
 
     Parameters
     ----------
     values : mapping
         Parameters as plain JSON values, from `WarpMapParameters.to_metadata`.
+    version : int
+        Of what is made from them.
 
     Returns
     -------
     str
         SHA-256, in hexadecimal, of the rounded parameters and of the version of what is made from them.
     """
-    return _digest({name: _rounded(value, _DECIMALS.get(name)) for name, value in values.items()})
+    return _digest({name: _rounded(value, _DECIMALS.get(name)) for name, value in values.items()}, version)
 
 
-def is_hash_of(text: str, values: Mapping[str, Any]) -> bool:
-    """Return whether a hash belongs to these parameters and to the maps of this version.
+def version_of(text: str, values: Mapping[str, Any]) -> int | None:
+    """Return the version of the maps that a hash belongs to, or None if it is not a hash of these parameters.
 
     Parameters
     ----------
     text : str
-        From a map's header. Version 0.1.0 hashed all digits of the parameters; its hashes are accepted.
+        From a map's header. Version 0.1.0 hashed all digits of the parameters; its hashes are known too.
     values : mapping
         The header's parameters.
     """
-    return text in (hash_of(values), _digest(values))
+    for version in range(BAKE_VERSION, 0, -1):
+        if text in (hash_of(values, version), _digest(values, version)):
+            return version
+    return None
 
 
 def agree(made: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
@@ -82,8 +87,8 @@ def agree(made: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
     )
 
 
-def _digest(values: Mapping[str, Any]) -> str:
-    text = json.dumps({"bake_version": BAKE_VERSION, **values}, sort_keys=True, separators=(",", ":"))
+def _digest(values: Mapping[str, Any], version: int) -> str:
+    text = json.dumps({"bake_version": version, **values}, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 

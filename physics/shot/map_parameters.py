@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, check_settings
+from ..images.exr_header import LARGEST_SIDE, MOST_PIXELS, fits
 from ..kerr.metric import check_spin, isco_radius, metric_functions
 from ..kerr.observer import Observer
 from ..numerics.checks import number, shown, three, vector, whole
@@ -110,6 +111,7 @@ class WarpMapParameters:
             )
         if self.supersampling not in SUPERSAMPLING:
             raise BlackHoleError(f"The supersampling is {self.supersampling}; choose 1, 2 or 4.", code="settings.range")
+        self.check_size()
         if not all(math.isfinite(value) for value in (*self.camera_position, *self.velocity)):
             raise BlackHoleError("The camera's place and velocity must be finite numbers.", code="camera.position")
         for name in ("camera_to_hole", "hole_to_world"):
@@ -121,6 +123,16 @@ class WarpMapParameters:
         self.observer()
         if self.disk is not None:
             self.disk.validate(self.spin, self.method)
+
+    def check_size(self, pictures: int = 1) -> None:
+        """Raise BlackHoleError when a map of so many pictures, one below the other, is too large for a file."""
+        width, height = self.map_size
+        if not fits(width, pictures * height):
+            raise BlackHoleError(
+                f"The map is {width} x {pictures * height} pixels large; it can have up to {MOST_PIXELS} pixels, and "
+                f"{LARGEST_SIDE} along a side. Lower the resolution or the supersampling.",
+                code="camera.size",
+            )
 
     @property
     def radius(self) -> float:
@@ -232,8 +244,18 @@ def looking_at_hole(position: Vector) -> Matrix:
     nested tuple of float, shape (3, 3)
         `camera_to_hole` of `WarpMapParameters`. On the spin axis itself, where upright has no meaning, the picture's
         up is the direction of phi = 0 (x).
+
+    Raises
+    ------
+    BlackHoleError
+        If the position is that of the hole, or infinitely far away.
     """
-    back = np.array(position) / np.linalg.norm(position)
+    distance = math.hypot(*position)
+    if not 0.0 < distance < math.inf:
+        raise BlackHoleError(
+            f"The camera is {distance:g} M from the hole; it must have a place outside of it.", code="camera.position"
+        )
+    back = np.array(position) / distance
     right = np.cross([0.0, 0.0, 1.0], back)
     if np.linalg.norm(right) < 1e-12:
         right = np.cross([1.0, 0.0, 0.0], back)

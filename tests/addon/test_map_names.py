@@ -208,7 +208,7 @@ def test_maps_of_version_0_1_0_are_adopted(
     save(tmp_path / "old.blend")
     parameters = addon_module("outputs.frames").read_at(scene, 1).parameters
     baked = physics.bake(parameters)
-    baked.metadata["hash"] = identity._digest(parameters.to_metadata())
+    baked.metadata["hash"] = identity._digest(parameters.to_metadata(), 1)
     assert baked.metadata["hash"] != parameters.hash
     physics.write_warp_map(tmp_path / "maps" / "Scene_Black_Hole_64x36_0001.exr", baked)
     scene.umbra.map_names = ""
