@@ -131,7 +131,7 @@ def write_channels(
         try:
             exr.write(str(temporary), channels, attributes or {})
             expected = temporary.stat().st_size
-        except RuntimeError as error:
+        except (RuntimeError, ValueError, TypeError) as error:
             raise OSError(f"the EXR writer failed ({error})") from error
         if not expected:
             raise OSError("no space left on the device")

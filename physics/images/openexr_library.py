@@ -48,7 +48,7 @@ class OpenEXRLibrary:
             "type": self._module.scanlineimage,
         }
         with self._threads(), self._module.File(header, dict(channels)) as file:
-            file.write(path)
+            file.write(path if _is_utf8(path) else os.fsencode(path))
 
     def _opened(self, path: str, data: bytes) -> Any:
         try:
@@ -72,6 +72,15 @@ class OpenEXRLibrary:
                 yield
             finally:
                 set_count(0)
+
+
+def _is_utf8(path: str) -> bool:
+    """Return whether a path can be handed over as text; any other only goes through as bytes."""
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 # --- which one ------------------------------------------------------------------------------------
