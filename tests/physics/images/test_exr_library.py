@@ -208,6 +208,15 @@ def test_older_releases_that_read_by_name_only(tmp_path: Path, monkeypatch: pyte
     assert header["umbraFormat"] == ATTRIBUTES["umbraFormat"]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere all names are text")
+def test_a_name_that_is_no_utf_8(tmp_path: Path) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/sky_\xe9.exr")
+    exr.write_channels(path, planes(), ATTRIBUTES)
+    channels, header = exr.read_channels(path)
+    assert all(channels[key].tobytes() == plane.tobytes() for key, plane in planes().items())
+    assert header == exr.read_exr_header(path)
+
+
 # --- the copy that is bound to itself -------------------------------------------------------------
 
 
