@@ -11,6 +11,7 @@ import importlib.util
 import itertools
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class OpenImageIOLibrary:
     """
 
     def __init__(self, folders: Sequence[str]) -> None:
-        self._module = _find(folders)
+        self._module = find(folders)
         self.name = f"{NAME} {self._module.VERSION_STRING}"
 
     def read(self, path: str, data: bytes) -> dict[str, NDArray[Any]]:
@@ -84,9 +85,21 @@ class OpenImageIOLibrary:
             raise RuntimeError(target.geterror() or self._module.geterror() or "it gives no reason")
 
 
-def _find(folders: Sequence[str]) -> Any:
+def find(folders: Sequence[str] = ()) -> Any:
+    """Return the package OpenImageIO.
+
+    Parameters
+    ----------
+    folders : sequence of str, optional
+        Where to look for it when it is not on Python's path; then Blender's package is looked into.
+
+    Raises
+    ------
+    ImportError
+        If it is not there.
+    """
     if NAME not in sys.modules and importlib.util.find_spec(NAME) is None:
-        found = importlib.machinery.PathFinder.find_spec(NAME, list(folders))
+        found = importlib.machinery.PathFinder.find_spec(NAME, [*folders, *_inside_blender()])
         if found is None or found.loader is None:
             raise ImportError(f"there is no {NAME}")
         module = importlib.util.module_from_spec(found)
@@ -101,3 +114,14 @@ def _find(folders: Sequence[str]) -> Any:
     if not hasattr(OpenImageIO, "VERSION_STRING"):
         raise ImportError(f"the module {NAME} is not the one of that name")
     return OpenImageIO
+
+
+def _inside_blender() -> list[str]:
+    """Where the package `bpy`, if it is installed here, keeps packages of its own; it is not imported for that."""
+    blender = importlib.util.find_spec("bpy")
+    if blender is None or blender.origin is None:
+        return []
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    root = Path(blender.origin).parent
+    places = (*root.glob(f"*/python/lib/{version}/site-packages"), *root.glob("*/python/lib/site-packages"))
+    return [str(place) for place in places]

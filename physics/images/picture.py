@@ -1,25 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading pictures of any common format as linear Rec. 709: OpenEXR by itself, the others by OpenImageIO.
 
-The one module that knows OpenImageIO. Blender has it, as a module of its own Python; elsewhere it is a package.
+Blender has OpenImageIO, as a module of its own Python; elsewhere it is a package.
 """
 
 from __future__ import annotations
 
-import functools
-import importlib
-import importlib.util
 import os
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.errors import ImageFileError
-from . import exr_header
+from . import exr_header, openimageio_library
 from .chromaticities import to_rec709
 from .exr import PathLike, read_beginning, read_exr
 from .file_names import is_text
@@ -132,32 +127,12 @@ def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float64]:
     return linear
 
 
-@functools.cache
-def image_io() -> ModuleType | None:
+def image_io() -> Any:
     """Return OpenImageIO, or None where there is none: the package, or the one that Blender's package contains."""
     try:
-        return importlib.import_module("OpenImageIO")
+        return openimageio_library.find()
     except ImportError:
-        pass
-    blender = importlib.util.find_spec("bpy")  # finds it without starting Blender
-    if blender is None or blender.origin is None:
         return None
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    places = [
-        *Path(blender.origin).parent.glob(f"*/python/lib/{version}/site-packages"),
-        *Path(blender.origin).parent.glob("*/python/lib/site-packages"),  # Windows
-    ]
-    for place in places:
-        if not (place / "OpenImageIO").is_dir():
-            continue
-        sys.path.append(str(place))
-        try:
-            return importlib.import_module("OpenImageIO")
-        except ImportError:
-            continue
-        finally:
-            sys.path.remove(str(place))
-    return None
 
 
 def _complaint(text: str) -> str:

@@ -158,15 +158,7 @@ def test_an_old_openexr_that_is_loaded_first_is_left_alone(tmp_path: Path) -> No
 
 
 def test_an_old_openexr_and_no_other_gives_way_to_openimageio() -> None:
-    action = f"""
-try:
-    physics.exr_library()
-except physics.ImageFileError as error:
-    assert "too old" in str(error), error
-else:
-    raise SystemExit("the old one was taken")
-print(physics.exr_library([{blender_packages()!r}]))
-"""
+    action = "print(physics.exr_library())"
     before = "importlib.metadata.distributions = lambda **_: []"
     result = run(STAND_IN.format(before=before, action=action), hidden=set())
     assert result.returncode == 0, result.stderr
