@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,6 +53,47 @@ def coverage(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) 
     share = share_above(u - low, slope_x, slope_y) - share_above(u - high, slope_x, slope_y)
     share = np.where(share < LEAST_COVERAGE, 0.0, share)
     return np.where(share > 1.0 - LEAST_COVERAGE, 1.0, share)
+
+
+def misses(u: NDArray[Any], corners: NDArray[Any], low: float, high: float) -> NDArray[np.bool_]:
+    """Return which pixels miss the annulus although a straight u might meet it, shape (n,).
+
+    Where u bends, as where rays end beside a camera near the plane, its slope leads astray: center and corners say that
+    all of the pixel is off to one side.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        At the pixels' centers.
+    corners : ndarray, shape (4, n)
+        u at their corners.
+    low, high : float
+        u at the annulus's rims.
+    """
+    inside: NDArray[np.bool_] = np.minimum(u, corners.min(axis=0)) > high
+    outside: NDArray[np.bool_] = np.maximum(u, corners.max(axis=0)) < low
+    return inside | outside
+
+
+def misses_with_neighbors(u: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which pixels miss the annulus as `misses` does, from u at the centers around: what a straight u reaches
+    within a pixel, its neighbor on that side has beyond it.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, rows, columns)
+        At the pixels' centers. Where a neighbor is not known, NaN, a pixel does not miss; beyond the sides, they are
+        taken as those within.
+    low, high : float
+        u at the annulus's rims.
+    """
+    missed = np.zeros(u.shape, dtype=bool)
+    rows, columns = u.shape[1:]
+    for off in (u > high, u < low):
+        wide = np.pad(off, [(0, 0), (1, 1), (1, 1)], mode="edge")
+        parts = [wide[:, row : row + rows, column : column + columns] for row in range(3) for column in range(3)]
+        missed |= np.logical_and.reduce(parts)
+    return missed
 
 
 def nearest_covered(u: Array, slope_x: Array, slope_y: Array, low: float, high: float) -> tuple[Array, Array, Array]:

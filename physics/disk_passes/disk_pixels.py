@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..numerics.arrays import Array, Index, Mask
 from ..numerics.blocks import BLOCK_SIZE
 from ..sampling.tiles import TILE_SIDES, Tiles, tiles_of
-from .annulus import coverage, nearest_covered
+from .annulus import coverage, misses_with_neighbors, nearest_covered
 from .disk_planes import DiskPlanes, mean_matter, slopes
 from .disk_samples import DiskSamples, U
 
@@ -103,6 +103,7 @@ class DiskTracing:
             finer &= open_here
             with np.errstate(invalid="ignore"):
                 share = coverage(here[U], across, down, self._low, self._high)
+                share[misses_with_neighbors(here[U], self._low, self._high)] = 0.0
                 seen = np.flatnonzero((share > 0.0) & ~finer & open_here)
             moved = here.reshape(len(here), -1).take(seen, axis=1)
             u, x, y = nearest_covered(moved[U], across.take(seen), down.take(seen), self._low, self._high)
@@ -117,21 +118,29 @@ class DiskTracing:
         """Return which pixels have a rim in or beside them that is not nearly straight, shape (n, side, side)."""
         bend = np.abs(np.gradient(across, axis=2)) + np.abs(np.gradient(down, axis=1))
         bend += np.abs(np.gradient(across, axis=1))
-        reach = 0.5 * (np.abs(across) + np.abs(down)) + bend
+        unknown = np.isnan(bend)  # beside pixels that are not traced
+        reach = 0.5 * (np.abs(across) + np.abs(down)) + np.where(unknown, 0.0, bend)
         # A neighbor may reach further than the mean slope says.
         step_x, step_y = np.abs(np.diff(u, axis=2)), np.abs(np.diff(u, axis=1))
-        reach[:, :, 1:], reach[:, :, :-1] = np.maximum(reach[:, :, 1:], step_x), np.maximum(reach[:, :, :-1], step_x)
-        reach[:, 1:], reach[:, :-1] = np.maximum(reach[:, 1:], step_y), np.maximum(reach[:, :-1], step_y)
+        reach[:, :, 1:], reach[:, :, :-1] = np.fmax(reach[:, :, 1:], step_x), np.fmax(reach[:, :, :-1], step_x)
+        reach[:, 1:], reach[:, :-1] = np.fmax(reach[:, 1:], step_y), np.fmax(reach[:, :-1], step_y)
         touched = (u + reach > self._low) & (u - reach < self._high)
         whole = (u - reach > self._low) & (u + reach < self._high)
         steep = np.hypot(across, down)
-        needs: Mask = touched & ~whole & (bend > 8.0 * LARGEST_BEND * steep)
+        # At a tile's edge slopes are of one side, and do not tell whether a pixel reaches a rim that its center is off.
+        edge = np.ones(u.shape[1:], dtype=bool)
+        edge[1:-1, 1:-1] = False
+        off = (edge | unknown) & ((u < self._low) | (u > self._high))
+        needs: Mask = touched & ~whole & (off | (bend > 8.0 * LARGEST_BEND * steep))
         return needs
 
     def _divide(self, order: int, columns: NDArray[np.intp], rows: NDArray[np.intp], centers: Array) -> None:
-        """Fill pixels from places on a finer grid inside them, and from their centers, shape (channels, n)."""
-        group = max(1, BLOCK_SIZE // FINER**2)
-        steps = (np.arange(FINER) + 0.5) / FINER
+        """Fill pixels from places on a finer grid inside them, and from their centers, shape (channels, n).
+
+        A place more on each side gives the others slopes of both sides.
+        """
+        group = max(1, BLOCK_SIZE // (FINER + 2) ** 2)
+        steps = (np.arange(-1, FINER + 1) + 0.5) / FINER
         for start in range(0, len(columns), group):
             column, row = columns[start : start + group], rows[start : start + group]
             x, y = column[:, None, None] + steps, row[:, None, None] + steps[:, None]
@@ -142,10 +151,12 @@ class DiskTracing:
             here = values[order].reshape(-1, *x.shape)
             here[U] = np.clip(here[U], *self._bounds)
             down, across = np.gradient(here[U], axis=(1, 2))
-            shares = coverage(here[U], across, down, self._low, self._high).reshape(len(column), -1)
+            shares = coverage(here[U], across, down, self._low, self._high)
+            shares[misses_with_neighbors(here[U], self._low, self._high)] = 0.0
+            shares = shares[:, 1:-1, 1:-1].reshape(len(column), -1)
             share = shares.mean(axis=1)
             seen = share > 0.0
-            here = here.reshape(self._samples.channels, len(column), -1)[:, seen]
+            here = here[:, :, 1:-1, 1:-1].reshape(self._samples.channels, len(column), -1)[:, seen]
             here[U] = np.clip(here[U], self._low, self._high)
             radius, phi, g = self._samples.matter(here)
             matter = mean_matter(radius.T, phi.T, g.T, shares[seen].T)

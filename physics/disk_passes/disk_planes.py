@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..numerics.angles import wrap, wrap_once, wrap_symmetric
 from ..numerics.arrays import Array, Index, indices
 from ..sampling.tiles import TILE_SIDES, Tiles, at_pixels
-from .annulus import coverage, nearest_covered
+from .annulus import coverage, misses, nearest_covered
 from .disk_samples import PHI, Matter, U
 
 Channels = NDArray[Any]
@@ -71,7 +71,8 @@ class DiskPlanes:
         self._width, self._height = width, height
         self._bent = bent
         self.planes = np.zeros((crossings, 4, height, width), np.float32)
-        self._rims: defaultdict[tuple[int, MatterOf], list[tuple[Index, Channels, Array, Array]]] = defaultdict(list)
+        self._rims: defaultdict[tuple[int, MatterOf], list[tuple[Index, Channels, Array, Array, Array]]]
+        self._rims = defaultdict(list)
 
     def fill(self, order: int, tiles: Tiles, coefficients: Array, matter: MatterOf) -> None:
         """Fill tiles from Chebyshev coefficients, shape (n, channels, points, points), but for pixels next to a rim,
@@ -104,7 +105,8 @@ class DiskPlanes:
             self._fill_whole(order, tiles.select(part), values[:, part], matter)
         if not whole.all():
             part = indices(~whole)
-            self._fill_rim(order, tiles.select(part), values[:, part], reach[part], matter)
+            corners = _corners(tiles.side, coefficients[U, part])
+            self._fill_rim(order, tiles.select(part), values[:, part], corners, reach[part], matter)
 
     def _fill_whole(self, order: int, tiles: Tiles, values: Channels, matter: MatterOf) -> None:
         """Write tiles that are wholly covered, from channels of shape (channels, n, rows, columns)."""
@@ -112,15 +114,26 @@ class DiskPlanes:
         for plane, channel in zip(self.planes[order], (*matter(values), share), strict=True):
             tiles.put(plane, channel)
 
-    def _fill_rim(self, order: int, tiles: Tiles, values: Channels, reach: NDArray[Any], matter: MatterOf) -> None:
-        """Write tiles with a rim in them from channels of shape (channels, n, rows, columns); `reach` as above."""
+    def _fill_rim(
+        self,
+        order: int,
+        tiles: Tiles,
+        values: Channels,
+        corners: NDArray[Any],
+        reach: NDArray[Any],
+        matter: MatterOf,
+    ) -> None:
+        """Write tiles with a rim in them from channels of shape (channels, n, rows, columns); `corners`: u at corners
+        of pixels, shape (n, side + 1, side + 1); `reach` as above."""
         u, reach = values[U], reach[:, None, None]
         off = np.maximum(self._bent.low - u, u - self._bent.high)
         wholly = off <= -reach
         rim, where = self._in_picture(tiles, np.flatnonzero((off < reach) != wholly), u.shape)
+        tile, row, column = np.unravel_index(rim, u.shape)
+        around = np.stack([corners[tile, row + below, column + right] for below in (0, 1) for right in (0, 1)])
         channels = values.reshape(len(values), -1)
         right, below = slopes(values, rim)
-        self._rims[order, matter].append((where, channels.take(rim, axis=1), right, below))
+        self._rims[order, matter].append((where, channels.take(rim, axis=1), right, below, around))
         if np.count_nonzero(wholly) < DENSE * wholly.size:
             inside, where = self._in_picture(tiles, np.flatnonzero(wholly), u.shape)
             self._put(order, where, matter(channels.take(inside, axis=1)), 1.0)
@@ -143,8 +156,9 @@ class DiskPlanes:
     def fill_rims(self) -> None:
         """Write the pixels next to the rims in the tiles filled: all at once, as there are few in each."""
         for (order, matter), parts in self._rims.items():
-            where, here, right, below = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+            where, here, right, below, around = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
             share = coverage(here[U], right[U], below[U], self._bent.low, self._bent.high)
+            share[misses(here[U], around, self._bent.low, self._bent.high)] = 0.0
             seen = np.flatnonzero(share > 0.0)
             right, below, here = (each.take(seen, axis=1) for each in (right, below, here))
             met, x, y = nearest_covered(here[U], right[U], below[U], self._bent.low, self._bent.high)
@@ -190,6 +204,22 @@ def slopes(values: Channels, place: Index) -> tuple[Array, Array]:
     change = change / (1.0 + (before & after))
     change[np.isnan(change)] = 0.0
     return change[:, 0], change[:, 1]
+
+
+def _corners(side: int, coefficients: NDArray[Any]) -> NDArray[Any]:
+    """Return values at the corners of pixels, shape (n, side + 1, side + 1), from Chebyshev coefficients, shape (n,
+    points, points)."""
+    base = _at_corners(side, coefficients.shape[-1])
+    corners: NDArray[Any] = base @ coefficients @ base.T
+    return corners
+
+
+@cache
+def _at_corners(side: int, count: int) -> NDArray[np.float32]:
+    """Return the Chebyshev polynomials at the corners of a tile's pixels, shape (side + 1, count)."""
+    place = np.linspace(-1.0, 1.0, side + 1)[:, None]
+    polynomials: NDArray[np.float32] = np.cos(np.arange(count) * np.arccos(place)).astype(np.float32)
+    return polynomials
 
 
 @cache

@@ -338,3 +338,53 @@ def test_winding_keeps_its_digits():
         small = gap * u / (1.0 - (1.0 - 0.5 * gap) * u)
         expected = spin / gap * sum(-(small**k) / k for k in range(1, 200))
         assert winding(spin, np.array([u], np.float32))[0] == pytest.approx(expected, rel=2e-6)
+
+
+# Cameras inside the ergosphere that see the disk by light of negative energy or beside such light: above the plane and
+# next to it, inside the disk's inner rim and outside, of either spin.
+DEEP = [
+    (0.999, 1.4, 70.0, 1.33),
+    (0.999, 1.1, 87.0, None),
+    (0.95, 1.7, 87.0, None),
+    (0.95, 1.4, 87.0, None),
+    (-0.95, 1.4, 87.0, 1.325),
+    (0.999, 1.7, 70.0, 1.615),
+]
+
+
+@pytest.mark.parametrize(("spin", "radius", "inclination", "inner"), DEEP)
+def test_no_pixel_shows_a_disk_that_is_not_there(spin, radius, inclination, inner):
+    """Light of no or negative energy ends at the horizon: no place near a pixel without the disk sees it.
+
+    All of a pixel and half of those around it are looked at, by 15 x 15 rays. A disk that none of these meets covers
+    no part of the pixel.
+    """
+    theta = math.radians(inclination)
+    parameters = shot(
+        spin=spin,
+        camera=PanoramaCamera(128, 64),
+        camera_position=(radius * math.sin(theta), 0.0, radius * math.cos(theta)),
+        camera_to_hole=((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
+        motion="fido",
+        disk=Disk(crossings=1, inner_radius=inner, outer_radius=10.0),
+    )
+    view, (width, height) = View(parameters), parameters.map_size
+    (one,) = bake(parameters).disk_passes
+    rows, columns = np.nonzero(one.coverage > 0.0)
+    low, high = parameters.disk.radii(spin)
+    centers = np.mgrid[0:height, 0:width].reshape(2, -1) + 0.5
+    found, light = view.crossings(centers[1], centers[0], 1, 1e-6, "gauss-legendre")
+    assert (light.energy <= 0.0).sum() > 100
+    with np.errstate(invalid="ignore"):
+        on_disk = ((found.u >= 1.0 / high) & (found.u <= 1.0 / low)).reshape(height, width)
+    beside = np.pad(on_disk, 1)
+    near = sum(beside[1 + y : 1 + y + height, 1 + x : 1 + x + width] for y in (-1, 0, 1) for x in (-1, 0, 1)) > 0
+    left = np.flatnonzero(~near[rows, columns])
+    rows, columns = rows[left], columns[left]
+    places = np.linspace(-0.5, 1.5, 15)
+    y, x = (each.astype(np.float64) for each in (rows, columns))
+    y, x = np.broadcast_arrays(y[:, None, None] + places[:, None], x[:, None, None] + places)
+    found, _ = view.crossings(x.ravel(), y.ravel(), 1, 1e-6, "gauss-legendre")
+    with np.errstate(invalid="ignore"):
+        seen = ((found.u >= 1.0 / high) & (found.u <= 1.0 / low)).reshape(x.shape).any(axis=(1, 2))
+    assert seen.all(), (rows[~seen], columns[~seen])

@@ -10,8 +10,10 @@ from references import angle_between, random_sky, unit_vectors
 from physics import METHODS, Fate, Observer, trace_rays
 from physics.geodesics.polar import PolarMotion
 from physics.geodesics.quadrature import NODE_COUNTS, RULES
+from physics.geodesics.tracer import trace_block
+from physics.kerr.critical_curve import around_hole, edge_angles
 from physics.kerr.metric import horizon_radius
-from physics.kerr.rays import camera_directions, rays_from_camera
+from physics.kerr.rays import camera_directions, rays_from_camera, rays_from_triad
 
 CAMERAS = {
     "orbit": (0.999, Observer.circular_orbit(0.999, 10.0)),
@@ -110,3 +112,28 @@ def test_polar_motion_conserves_carters_constant(theta):
     assert (speed**2).sum(axis=0) == pytest.approx(expected, rel=1e-8)
     turning = here[0] * speed[1] - here[1] * speed[0]
     assert turning == pytest.approx(-rays.b, abs=1e-8 * np.sqrt(rays.q_plus_b2).max())
+
+
+@pytest.mark.parametrize(
+    ("spin", "observer", "ordinary", "beside"),
+    [
+        (0.9, Observer.fido(20.0, 1.4, 0.0), (0.0, 0.01), (0.9, 1.0)),
+        (0.0, Observer.fido(10.0, 1.0, 0.0), (0.0, 0.01), (0.9, 1.0)),
+        (0.999, Observer.fido(1.4, 1.5, 0.0), (0.1, 0.2), (0.3, 0.6)),
+        (0.9999, Observer.fido(1.2, 1.4, 0.0), (0.25, 0.4), (0.3, 0.6)),
+    ],
+)
+def test_boyer_and_lindquists_coordinates_carry_what_the_manual_says(spin, observer, ordinary, beside):
+    """Of rays from all of the sky, and of those a hundredth outside of the shadow's edge; the others are right."""
+    theta_rd, phi_rd = random_sky(600)
+    best = trace_rays(spin, observer, theta_rd, phi_rd)
+    printed = trace_rays(spin, observer, theta_rd, phi_rd, method="cash-karp-printed")
+    lost = printed.fate == Fate.UNRESOLVED
+    sky = best.fate == Fate.SKY
+    assert ordinary[0] <= lost[sky].mean() <= ordinary[1]
+    assert np.array_equal(printed.fate[~lost], best.fate[~lost])
+    around = np.linspace(0.0, 2.0 * np.pi, 200, endpoint=False) + 0.003
+    edge = edge_angles(spin, observer, np.cos(around), np.sin(around), 1e-12)
+    rays = rays_from_triad(spin, observer, around_hole(1.01 * edge, np.cos(around), np.sin(around)))
+    fate, _ = trace_block(rays, 1e-6, "cash-karp-printed")
+    assert beside[0] <= (fate == Fate.UNRESOLVED).mean() <= beside[1]

@@ -60,6 +60,22 @@ def traced(parameters: WarpMapParameters, directions: np.ndarray):
     return fate == Fate.SKY, origin @ np.array(TILTED).T, rays.one_plus_z
 
 
+@pytest.mark.parametrize(("spin", "most", "close_most"), [(0.999, 2e-2, 5e-2), (0.9999, 4e-2, 1.5e-1)])
+@pytest.mark.parametrize("theta", [90.0, 75.0])
+def test_the_look_up_next_to_a_fast_hole_is_as_good_as_the_manual_says(spin, most, close_most, theta) -> None:
+    """Beside the flat side of the shadow, 2.2 M from the hole; close to it are the second half of the directions."""
+    place = (2.2 * math.sin(math.radians(theta)), 0.0, 2.2 * math.cos(math.radians(theta)))
+    parameters = shot(spin, place)
+    directions = directions_about(parameters)
+    sky, origin, _ = traced(parameters, directions)
+    found, _, visible = made(parameters).look_up(directions)
+    both = sky & visible
+    errors = 2.0 * np.arcsin(np.minimum(np.linalg.norm(found - origin, axis=1) / 2.0, 1.0))
+    close = np.arange(len(directions)) >= len(directions) // 2
+    assert np.quantile(errors[both], 0.99) < most
+    assert np.quantile(errors[both & close], 0.99) < close_most
+
+
 # The bilinear error falls by four when steps are halved: the grids' steps are 0.14 and 0.03 of s, where the sky turns
 # by up to twice that. The largest errors lie where the sky is crowded, a thousandth of the shadow's size from its edge.
 @pytest.mark.parametrize(("grid", "median", "most"), [(FINAL, 2e-5, 1e-3), (PREVIEW, 4e-4, 1.5e-2)])
