@@ -198,6 +198,7 @@ def _steps() -> Iterator[None]:
 def _provide_maps(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Make sure that the maps of the frame being rendered are right, and let its picture read them."""
     frame, depsgraph = _read(scene, depsgraph)
+    frames.check_sky(scene)
     _note_unstable_orbit(scene, frame.parameters)
     for wanted in frames.requests_of(scene, frame):
         baking.provide(wanted, may_bake=scene.umbra.auto_bake)

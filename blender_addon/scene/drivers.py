@@ -30,7 +30,12 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
-def check(owner: bpy.types.ID | None, frame: int, prefixes: Iterable[str] = ("",)) -> None:
+def check(
+    owner: bpy.types.ID | None,
+    frame: int,
+    depsgraph: bpy.types.Depsgraph | None = None,
+    prefixes: Iterable[str] = ("",),
+) -> None:
     """Refuse a datablock with a driver that fails, or whose result is not a finite number.
 
     Parameters
@@ -39,6 +44,8 @@ def check(owner: bpy.types.ID | None, frame: int, prefixes: Iterable[str] = ("",
         The (original) datablock.
     frame : int
         The frame at which the scene stands.
+    depsgraph : Depsgraph, optional
+        What has evaluated the drivers: failures in a render are noted there alone.
     prefixes : iterable of str
         What the data paths of the properties begin with that count.
 
@@ -51,7 +58,8 @@ def check(owner: bpy.types.ID | None, frame: int, prefixes: Iterable[str] = ("",
     if owner is None or animation is None:
         return
     beginnings = tuple(prefixes)
-    for curve in animation.drivers:
+    evaluated = None if depsgraph is None else owner.evaluated_get(depsgraph).animation_data
+    for curve in animation.drivers if evaluated is None else evaluated.drivers:
         if curve.mute or not curve.data_path.startswith(beginnings):
             continue
         if curve.driver.is_valid and curve.is_valid and _is_finite(curve.driver, frame):
@@ -65,12 +73,12 @@ def check(owner: bpy.types.ID | None, frame: int, prefixes: Iterable[str] = ("",
         )
 
 
-def check_objects(objects: Iterable[bpy.types.Object], frame: int) -> None:
+def check_objects(objects: Iterable[bpy.types.Object], frame: int, depsgraph: bpy.types.Depsgraph) -> None:
     """Refuse broken drivers of objects, of their cameras, and of the objects that place them; see `check`."""
     for each in with_causes(objects):
-        check(each, frame)
+        check(each, frame, depsgraph)
         if isinstance(each.data, bpy.types.Camera):
-            check(each.data, frame)
+            check(each.data, frame, depsgraph)
 
 
 def _property(owner: bpy.types.ID, curve: bpy.types.FCurve) -> str:
@@ -100,10 +108,12 @@ def _is_finite(driver: bpy.types.Driver, frame: int) -> bool:
         return True
     names = {**_BUILTINS, **bpy.app.driver_namespace, "frame": float(frame), **known}
     for unknown in values.keys() - known.keys():
-        del names[unknown]
+        names.pop(unknown, None)
     try:
         return math.isfinite(_evaluated(ast.parse(driver.expression.strip(), mode="eval").body, names))
-    except Exception:  # noqa: BLE001  an expression of another kind, or one that Blender itself has found to fail
+    except (ArithmeticError, ValueError):
+        return False
+    except Exception:  # noqa: BLE001  an expression of another kind
         return True
 
 

@@ -395,8 +395,8 @@ def read(
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
     camera = active_camera(scene)
-    drivers.check(scene, scene.frame_current, ("umbra.", "render."))
-    drivers.check_objects((hole, camera), scene.frame_current)
+    drivers.check(scene, scene.frame_current, depsgraph, ("umbra.", "render."))
+    drivers.check_objects((hole, camera), scene.frame_current, depsgraph)
 
     evaluated_hole = hole.evaluated_get(depsgraph)
     evaluated_camera = camera.evaluated_get(depsgraph)

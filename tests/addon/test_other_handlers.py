@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other add-ons whose handlers move camera or hole while a render goes on: sky and scene are of one place, or refused."""
+"""Other add-ons whose handlers move camera or hole in a render: sky and scene are of one place, or refused."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -170,7 +170,7 @@ handlers.frame_change_post.append(carry)
 @pytest.mark.parametrize("event", ["render_pre", "frame_change_post"])
 def test_a_handler_that_renames_the_scene(tmp_path: Path, output: str, event: str, exr: ModuleType) -> None:
     """What is remembered of a scene goes by its number in the session, not by its name."""
-    change = f"def rename(scene, *_):\n    scene.name = f'S {{scene.frame_current}}'\n"
+    change = "def rename(scene, *_):\n    scene.name = f'S {scene.frame_current}'\n"
     pictures = []
     for name, more in (("plain", ""), ("renamed", change + f"handlers.{event}.append(rename)\n")):
         folder = tmp_path / name
