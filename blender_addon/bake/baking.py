@@ -20,7 +20,7 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from . import claim
 from . import folder as map_folder
-from .check import fault_of, is_valid
+from .check import fault_of, is_valid, stamps
 from .frame_list import frames_text
 from .request import MapRequest, forget_shared_rays, older_maps
 
@@ -110,17 +110,18 @@ def _save(wanted: MapRequest, baked: Any) -> None:
         older.unlink(missing_ok=True)
 
 
-def provide(wanted: MapRequest, *, may_bake: bool) -> None:
-    """Make sure, for a render, that a frame's map is valid.
+def provide(wanted: MapRequest, *, may_bake: bool) -> dict[Path, object]:
+    """Make sure, for a render, that a frame's map is valid; return the stamps of the files that are.
 
     Raises
     ------
     physics.BlackHoleError
         If it is not, and may not or cannot be baked.
     """
+    found = stamps(wanted)
     fault = fault_of(wanted)
     if fault is None:
-        return
+        return found
     if not may_bake:
         raise SceneError(
             f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.", code="map.out-of-date"
@@ -129,12 +130,14 @@ def provide(wanted: MapRequest, *, may_bake: bool) -> None:
     with claim.Claims() as claims:
         if not take(claims, wanted):
             _wait_for_claim(claims, wanted)
+        found = stamps(wanted)
         if is_valid(wanted):
-            return
+            return found
         where = " into a temporary folder (the file is not saved)" if wanted.folder.is_temporary else ""
         print(f"Umbra: baking {wanted.what}{where}", flush=True)
         for _fraction in bake_map(wanted):
             claims.beat()
+        return stamps(wanted)
 
 
 def _wait_for_claim(claims: claim.Claims, wanted: MapRequest) -> None:

@@ -19,7 +19,7 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..scene.frame_setup import FrameSetup
-from .folder import MapFolder, folder
+from .folder import MapFolder, check_path, folder
 
 SEQUENCE_LENGTH = 1_000_000
 # Frames that have a file of their own.
@@ -122,9 +122,12 @@ def request(
     ------
     SceneError
         If the frame is beyond the numbers that file names have room for.
+    MapFolderError
+        If Blender would read another path.
     """
     where = folder(scene)
     name = file_name(scene, frame.hole_name, parameters.map_size, frame.frame, kind, parameters)
+    check_path(where.path / name)
     return MapRequest(frame.frame, where.path / name, kind, parameters, where)
 
 

@@ -12,13 +12,13 @@ calling them again. So ours waits until the others have run, and evaluates what 
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 import bpy
 
-from ..bake import baking
+from ..bake import baking, check
 from ..bake import folder as map_folder
 from ..core import messages
 from ..core.errors import MapFolderError, SceneError, unexpected
@@ -51,6 +51,8 @@ class _Render:
     """The unstable orbit was mentioned in this render."""
     shown: "physics.WarpMapParameters | None" = None
     """What the current frame's map is made from, once it is there."""
+    files: dict[Path, object] = field(default_factory=dict)
+    """The maps that it shows, as they were when they were checked."""
     placed: object = None
     """How hole and camera stood then."""
     turns: int = 0
@@ -167,8 +169,10 @@ def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
     if now.is_waiting:
         text = f"Frame {scene.frame_current} was rendered without its warp map or lens."
         _fail(scene, SceneError(text, code="render.no-map"))
-    elif now.shown is not None and now.placed != _placed(scene):
-        _guarded(_check_frame, scene)
+    elif now.shown is not None:
+        _guarded(_check_files, scene)
+        if now.placed != _placed(scene):
+            _guarded(_check_frame, scene)
     now.shown = None
 
 
@@ -200,12 +204,13 @@ def _provide_maps(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     frame, depsgraph = _read(scene, depsgraph)
     frames.check_sky(scene)
     _note_unstable_orbit(scene, frame.parameters)
+    files: dict[Path, object] = {}
     for wanted in frames.requests_of(scene, frame):
-        baking.provide(wanted, may_bake=scene.umbra.auto_bake)
+        files |= baking.provide(wanted, may_bake=scene.umbra.auto_bake)
     for warning in registry.of(scene).point_at(scene, depsgraph, frame):
         messages.warn(warning)
     now = _renders.of(scene)
-    now.shown, now.placed, now.is_waiting = frame.parameters, _placed(scene), False
+    now.shown, now.placed, now.files, now.is_waiting = frame.parameters, _placed(scene), files, False
 
 
 # --- beside other add-ons -------------------------------------------------------------------------
@@ -290,6 +295,17 @@ def _compare(scene: bpy.types.Scene, frame: frame_setup.FrameSetup) -> None:
             "switch it off, and render this frame again.",
             code="render.moved",
         )
+
+
+def _check_files(scene: bpy.types.Scene) -> None:
+    """Refuse a frame whose maps were not the same files, all through the render, as those that were checked."""
+    for path, stamp in _renders.of(scene).files.items():
+        if check.stamp(path) != stamp:
+            raise SceneError(
+                f"The map {path} was changed or removed while the frame was rendered, and the picture may be wrong: "
+                "render the frame again.",
+                code="render.map-changed",
+            )
 
 
 def _note_unstable_orbit(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
