@@ -20,13 +20,17 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from . import claim
 from . import folder as map_folder
-from .check import fault_of, is_valid
+from .check import fault_of, is_valid, stamps
+from .frame_list import frames_text
 from .kinds import forget_shared_rays
 from .request import MapRequest, older_maps
 from .reuse import OtherNames
 
-# What comes of a frame: its map was baked here, or was valid already.
-BAKED, KEPT = "baked", "kept"
+# What comes of a frame: its map was baked here, or was valid already; or there can be none.
+BAKED, KEPT, IMPOSSIBLE = "baked", "kept", "impossible"
+
+# Codes of errors that end all of the work: those of files, and these. Others are of one frame alone.
+_FATAL_KINDS, _FATAL = ("folder", "file", "command"), ("map.scene-gone",)
 
 # How long a step waits for a map that is being written, and how often a map is looked for that another process is
 # baking, seconds.
@@ -50,7 +54,7 @@ class Progress:
     """Share of all the work that is done, 0 to 1."""
     text: str
     outcome: str | None = None
-    """`BAKED` or `KEPT` where the frame is done."""
+    """`BAKED`, `KEPT` or `IMPOSSIBLE` where the frame is done."""
 
 
 @dataclass
@@ -62,6 +66,8 @@ class Summary:
     folder: map_folder.MapFolder | None = None
     unresolved: int = 0
     """Rays that no fate was found for within the allowed number of steps."""
+    impossible: "dict[int, physics.BlackHoleError]" = field(default_factory=dict)
+    """Frames that cannot be baked, and why."""
 
     def sentence(self) -> str:
         """Return one sentence for the artist."""
@@ -106,17 +112,21 @@ def _save(wanted: MapRequest, baked: Any) -> None:
         older.unlink(missing_ok=True)
 
 
-def provide(wanted: MapRequest, *, may_bake: bool) -> None:
-    """Make sure, for a render, that a frame's map is valid.
+def provide(wanted: MapRequest, *, may_bake: bool) -> dict[Path, object]:
+    """Make sure, for a render, that a frame's map is valid; return the stamps of the files that are.
 
     Raises
     ------
     physics.BlackHoleError
         If it is not, and may not or cannot be baked.
     """
+    found = stamps(wanted)
     fault = fault_of(wanted)
-    if fault is None or (take_over(wanted, OtherNames(wanted.path.parent)) and is_valid(wanted)):
-        return
+    if fault is not None and take_over(wanted, OtherNames(wanted.path.parent)):
+        found = stamps(wanted)
+        fault = fault_of(wanted)
+    if fault is None:
+        return found
     if not may_bake:
         raise SceneError(
             f"{fault}: bake it, or switch on Bake When Rendering in the Umbra panel.", code="map.out-of-date"
@@ -125,12 +135,14 @@ def provide(wanted: MapRequest, *, may_bake: bool) -> None:
     with claim.Claims() as claims:
         if not take(claims, wanted):
             _wait_for_claim(claims, wanted)
+        found = stamps(wanted)
         if is_valid(wanted):
-            return
+            return found
         where = " into a temporary folder (the file is not saved)" if wanted.folder.is_temporary else ""
         print(f"Umbra: baking {wanted.what}{where}", flush=True)
         for _fraction in bake_map(wanted):
             claims.beat()
+        return stamps(wanted)
 
 
 def _wait_for_claim(claims: claim.Claims, wanted: MapRequest) -> None:
@@ -167,7 +179,8 @@ def bake_frames(frames: Iterable[int], requests_at: RequestsAt) -> Generator[Pro
     Raises
     ------
     physics.BlackHoleError
-        As one sentence, which names the frame where there are several.
+        As one sentence, which names the frame where there are several. If frames are impossible, the others are baked
+        first.
     """
     wanted = list(frames)
     with claim.Claims() as claims, physics.Background() as writing:
@@ -179,13 +192,39 @@ def bake_frames(frames: Iterable[int], requests_at: RequestsAt) -> Generator[Pro
                 yield from work.wait_for(elsewhere[0])
                 todo, elsewhere = elsewhere, deque[int]()
             frame = todo.popleft()
-            with naming(frame, len(wanted)):
-                done = yield from work.bake(frame)
+            try:
+                with naming(frame, len(wanted)):
+                    done = yield from work.bake(frame)
+            except physics.BlackHoleError as error:
+                if is_fatal(error):
+                    raise
+                yield work.note_impossible(frame, error)
+                continue
             if not done:
                 elsewhere.append(frame)
         yield from work.finish_writing()
     forget_shared_rays()
+    _check_possible(work.summary.impossible, len(wanted))
     return work.summary
+
+
+def is_fatal(error: "physics.BlackHoleError") -> bool:
+    """Whether an error is of more than one frame, so that the work cannot go on with the others."""
+    return error.code in _FATAL or error.code.partition(".")[0] in _FATAL_KINDS
+
+
+def _check_possible(impossible: "dict[int, physics.BlackHoleError]", count: int) -> None:
+    if not impossible:
+        return
+    first = impossible[min(impossible)]
+    if len(impossible) == count == 1:
+        raise first
+    which = f"Frame {min(impossible)} is" if len(impossible) == 1 else f"Frames {frames_text(sorted(impossible))} are"
+    left = count - len(impossible)
+    others = {0: "no other was asked for", 1: "the other one has its map"}.get(
+        left, f"the other {left} have their maps"
+    )
+    raise SceneError(f"{which} impossible, {others}. {first}", code=first.code)
 
 
 class _Work:
@@ -227,7 +266,11 @@ class _Work:
                     yield from self.finish_writing()
                     yield self._progress(frame, outcome=BAKED)
                 continue
-            baked = yield from self._trace(wanted)
+            try:
+                baked = yield from self._trace(wanted)
+            except physics.BlackHoleError:
+                self._claims.release(wanted.path)
+                raise
             yield from self.finish_writing()
             self._writing.start(functools.partial(_write, wanted, baked, self._count))
             self._being_written = wanted, is_last
@@ -258,6 +301,11 @@ class _Work:
         if self._other_names is None:
             self._other_names = OtherNames(path.parent)
         return self._other_names
+
+    def note_impossible(self, frame: int, error: "physics.BlackHoleError") -> Progress:
+        """Leave a frame out that cannot be baked."""
+        self.summary.impossible[frame] = error
+        return self._progress(frame, outcome=IMPOSSIBLE)
 
     def _trace(self, wanted: MapRequest) -> Generator[Progress, None, Any]:
         steps = wanted.kind.steps(wanted.parameters)
@@ -291,7 +339,7 @@ class _Work:
             yield self._progress(frame, doing=f": waiting for {who}")
 
     def _progress(self, frame: int, fraction: float = 0.0, outcome: str | None = None, doing: str = "") -> Progress:
-        done = len(self.summary.baked) + len(self.summary.reused)
+        done = len(self.summary.baked) + len(self.summary.reused) + len(self.summary.impossible)
         self._fraction = max(self._fraction, min((done + fraction) / self._count, 1.0))
         place = f" ({self._places[frame]} of {self._count})" if self._count > 1 else ""
         return Progress(frame, self._fraction, f"Frame {frame}{place}{doing}", outcome)

@@ -13,9 +13,11 @@ from pathlib import Path
 
 import bpy
 
+from ..core.physics_api import physics
 from . import baking, claim
 from . import folder as map_folder
 from .check import FAULTY, State, check
+from .frame_list import frames_text
 from .names import kind_of, name_pattern, shot_name
 from .request import MapRequest
 
@@ -25,8 +27,10 @@ class FrameState:
     """The maps of one frame: one, its disk's passes counted in, or with the Cycles Lens two."""
 
     frame: int
-    path: Path
-    state: State
+    path: Path | None
+    """None where the frame is impossible."""
+    state: str
+    """One of `State`, or `baking.IMPOSSIBLE`."""
     fault: str
     size: int
     """Bytes."""
@@ -49,9 +53,9 @@ class Listing:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames by state, every state named."""
-        counted = Counter(each.state for each in self.frames)
-        return {str(state): counted[state] for state in State}
+        """Frames by state, every state of a map named."""
+        counted = Counter(str(each.state) for each in self.frames)
+        return {str(state): 0 for state in State} | counted
 
     @property
     def size(self) -> int:
@@ -87,6 +91,8 @@ class Cleaning:
 
     dry_run: bool
     removed: list[Removal] = field(default_factory=list)
+    impossible: list[int] = field(default_factory=list)
+    """Frames of which nobody can say what their maps should be."""
     in_use: list[Path] = field(default_factory=list)
     """Files that stay, because a process is baking their frames."""
 
@@ -104,6 +110,8 @@ class Cleaning:
             text = f"{verb} {len(self.removed)} file{'' if len(self.removed) == 1 else 's'}, {self.size / 1e6:.1f} MB"
         if self.in_use:
             text += f"; {len(self.in_use)} stay, because their frames are being baked"
+        if self.impossible:
+            text += f"; maps of frames that are impossible stay: {frames_text(self.impossible)}"
         return text + "."
 
 
@@ -179,15 +187,20 @@ def examine(
     Raises
     ------
     physics.BlackHoleError
-        If the scene is gone, or a frame is impossible; the sentence names it.
+        If the scene is gone, or the folder cannot be used.
     """
     wanted = list(frames)
     claims = claim.Claims()
     listing = Listing(names.folder, leftovers=[path for path, owner in names.leftovers if not claims.is_taken(owner)])
     for index, frame in enumerate(wanted):
         yield baking.Progress(frame, index / len(wanted), f"Frame {frame} ({index + 1} of {len(wanted)})")
-        with baking.naming(frame, len(wanted)):
+        try:
             needed = requests_at(frame)
+        except physics.BlackHoleError as error:
+            if baking.is_fatal(error):
+                raise
+            listing.frames.append(FrameState(frame, None, baking.IMPOSSIBLE, str(error), 0))
+            continue
         if needed:
             listing.frames.append(_state(frame, needed, names, claims, thorough))
     return listing
@@ -241,21 +254,25 @@ def clean(
     """
     wanted = list(frames)
     doomed: list[tuple[Path, Path, str]] = []
+    impossible: list[int] = []
     if everything:
         yield baking.Progress(wanted[0] if wanted else 0, 0.0, "Cleaning")
         doomed += [(names.folder / each, owner, "every map was to be removed") for each, owner in names.maps]
     else:
         listing = yield from examine(wanted, requests_at, names)
+        impossible = [each.frame for each in listing.frames if each.path is None]
         for each in listing.frames:
+            if each.path is None:
+                continue
             doomed += [(path, path, fault) for path, fault in each.faulty]
             doomed += [(path, each.path, f"{path} is out of date") for path in each.superseded]
     doomed += [(path, owner, f"{path} was left by a process that was killed") for path, owner in names.leftovers]
-    return _remove(doomed, dry_run)
+    return _remove(doomed, Cleaning(dry_run, impossible=impossible))
 
 
-def _remove(doomed: list[tuple[Path, Path, str]], dry_run: bool) -> Cleaning:
+def _remove(doomed: list[tuple[Path, Path, str]], cleaning: Cleaning) -> Cleaning:
     """Remove files, unless the map that each belongs to is being baked; paths, maps and reasons."""
-    cleaning = Cleaning(dry_run)
+    dry_run = cleaning.dry_run
     with claim.Claims() as claims:
         for path, owner, reason in doomed:
             if not path.is_file():

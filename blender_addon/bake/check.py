@@ -2,6 +2,7 @@
 """Whether map files are what their requests ask for."""
 
 import os
+from pathlib import Path
 
 import bpy
 
@@ -46,6 +47,20 @@ def fault_of(wanted: MapRequest, *, thorough: bool = True) -> str | None:
 def is_valid(wanted: MapRequest, *, thorough: bool = True) -> bool:
     """Return whether a map exists and was made from exactly these parameters."""
     return fault_of(wanted, thorough=thorough) is None
+
+
+def stamp(path: Path) -> object:
+    """Return what differs once another file is in this one's place; None where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def stamps(wanted: MapRequest) -> dict[Path, object]:
+    """Return the stamps of all files of a request."""
+    return {path: stamp(path) for path in wanted.files}
 
 
 def count_baked(scene: bpy.types.Scene, hole_name: str, like: MapRequest, frames: range) -> int:

@@ -31,6 +31,8 @@ _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.E
 # Maps that are taken over from other names are hidden under such a name while they are copied.
 _PART = re.compile(r"\.(?P<target>.+\.exr)\.[0-9a-f]+\.part")
 
+# Bytes that Blender keeps of a path, and those by which the name of a disk's pass may be longer than its map's.
+LONGEST_PATH, _LONGEST_PASS = 1023, 8
 
 # What the open file is being saved as, while it is.
 _saved_as: Value[Path | None] = SESSION.value(lambda: None, Life.FILE)
@@ -94,11 +96,36 @@ def _as_blender_keeps_it(chosen: str, path: Path) -> str:
 def _chosen_folder(scene: bpy.types.Scene) -> str:
     """What the artist chose, ending in a slash; what is not absolute is meant beside the .blend file."""
     chosen = scene.umbra.map_folder.strip() or DEFAULT_FOLDER
+    if os.sep == "/":  # a file dialog on Windows has stored its own separators
+        chosen = chosen.replace("\\", "/")
     if not chosen.startswith("//") and not Path(chosen).is_absolute():
         chosen = f"//{chosen}"
     beside, rest = ("//", chosen[2:]) if chosen.startswith("//") else ("", chosen)
     rest = rest.rstrip("/\\")
     return beside + (f"{rest}/" if rest or not beside else "")
+
+
+def check_path(path: Path) -> None:
+    """Refuse a path that Blender would read as another one.
+
+    Raises
+    ------
+    MapFolderError
+        It is too long, or has a backslash in it that is no separator.
+    """
+    length = len(os.fsencode(path)) + _LONGEST_PASS
+    if length > LONGEST_PATH:
+        raise MapFolderError(
+            f"The path of the warp maps has {length} bytes, and Blender reads {LONGEST_PATH} at most: choose a folder "
+            f"with a shorter path than {path.parent} in the Umbra panel.",
+            code="folder.path",
+        )
+    if os.sep == "/" and "\\" in str(path):
+        raise MapFolderError(
+            f"The path of the warp maps {path.parent} contains a backslash, which Blender takes for a separator: "
+            "rename the folder, or choose another one in the Umbra panel.",
+            code="folder.path",
+        )
 
 
 def prepare(path: Path, size: tuple[int, int], files: int = 1) -> None:

@@ -8,7 +8,7 @@ import bpy
 
 from ..core.physics_api import physics
 from ..scene.frame_setup import FrameSetup
-from .folder import MapFolder, folder
+from .folder import MapFolder, check_path, folder
 from .kinds import MapKind
 from .names import file_name
 
@@ -55,10 +55,13 @@ def request(
     ------
     SceneError
         If the frame is beyond the numbers that file names have room for.
+    MapFolderError
+        If Blender would read another path.
     """
     where = folder(scene)
     name = file_name(scene, frame.hole_name, parameters.map_size, frame.frame, kind, parameters)
     path = where.path / name
+    check_path(path)
     if kind.is_hashed and not path.exists():
         path = next((each for each in _older_maps(path, kind) if _is_it(each, kind, parameters)), path)
     return MapRequest(frame.frame, path, kind, parameters, where)

@@ -101,7 +101,7 @@ def _bake(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int]
     if not registry.of(scene).needs_maps(scene):
         out.line("The lens traces its rays itself (Rays: No Bake): there is nothing to bake.")
         return DONE, {"command": "bake", "baked": 0, "kept": 0, "unresolved": 0}
-    words = {baking.BAKED: "baked", baking.KEPT: "still valid"}
+    words = {baking.BAKED: "baked", baking.KEPT: "still valid", baking.IMPOSSIBLE: "impossible"}
 
     def tell(progress: baking.Progress) -> None:
         if progress.outcome is not None:
@@ -125,15 +125,15 @@ def _status(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[in
     steps = frame_maps.examine(scene, frames, options.view_layer, thorough=not options.quick)
     listing = _drain(steps, _tenths(out, "checking"), out)
     for each in listing.frames:
-        note = f"  {each.fault}" if each.state in check.FAULTY else ""
+        note = f"  {each.fault}" if each.state in (*check.FAULTY, baking.IMPOSSIBLE) else ""
         note += f"  {each.baker} is baking it" if each.baker else ""
-        out.line(f"{each.frame:7d}  {each.state:<8}{each.size / 1e6:9.1f} MB{note}")
+        out.line(f"{each.frame:7d}  {each.state:<10}{each.size / 1e6:9.1f} MB{note}")
         out.event(
             "frame",
             frame=each.frame,
             state=str(each.state),
             bytes=each.size,
-            path=str(each.path),
+            path=None if each.path is None else str(each.path),
             fault=each.fault or None,
             baker=each.baker,
         )
@@ -159,6 +159,7 @@ def _clean(options: argparse.Namespace, scene: bpy.types.Scene, frames: list[int
         "dry_run": options.dry_run,
         "files": len(cleaning.removed),
         "bytes": cleaning.size,
+        "impossible": cleaning.impossible,
         "in_use": [str(each) for each in cleaning.in_use],
         "folder": str(folder(scene).path),
     }

@@ -14,10 +14,12 @@ import bpy
 from ..bake import baking, cache
 from ..bake.request import MapRequest
 from ..core.errors import SceneError
+from ..core.physics_api import physics
 from ..core.session import scene_of
-from ..scene import frame_setup
+from ..scene import drivers, environment, frame_setup
 from ..scene.frame_setup import FrameSetup
 from . import registry
+from .shared import compositor_tree
 
 Result = TypeVar("Result")
 
@@ -33,6 +35,23 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, measured: bool 
 def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> FrameSetup:
     """Return the setup of any frame; see `frame_setup.read_at`."""
     return frame_setup.read_at(scene, frame, view_layer, registry.of(scene).traits)
+
+
+def check_sky(scene: bpy.types.Scene) -> None:
+    """Refuse broken drivers of what is not in the maps: of our nodes in the compositor, and of the World's.
+
+    Raises
+    ------
+    SceneError
+        The sentence names datablock and property.
+    """
+    frame, tree = scene.frame_current, compositor_tree.find_tree(scene)
+    if tree is not None:
+        ours = [each.path_from_id() for each in tree.nodes if compositor_tree.ROLE in each]
+        drivers.check(tree, frame, prefixes=[f"{path}." for path in ours])
+    if scene.world is not None and (scene.umbra.environment_source == "WORLD" or environment.WORLD_BEFORE in scene):
+        drivers.check(scene.world, frame)
+        drivers.check(scene.world.node_tree, frame)
 
 
 def requests_of(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
@@ -82,13 +101,21 @@ def bake(
 
 
 def _bake(uid: int, frames: list[int], requests: baking.RequestsAt) -> Generator[baking.Progress, None, baking.Summary]:
-    summary = yield from baking.bake_frames(frames, requests)
+    try:
+        summary = yield from baking.bake_frames(frames, requests)
+    except physics.BlackHoleError:
+        _show_baked(uid)  # those of the other frames
+        raise
+    _show_baked(uid)
+    return summary
+
+
+def _show_baked(uid: int) -> None:
     scene = scene_of(uid)
     if scene is not None:
         output = registry.of(scene)
         output.refresh(scene)
         output.forget_loaded_maps(scene)
-    return summary
 
 
 def examine(

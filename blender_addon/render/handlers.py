@@ -5,17 +5,20 @@ For each frame Blender calls render_pre, then frame_change_post with the render'
 animation, constraints and the camera of this frame are evaluated; then it renders and runs the compositor. So
 render_pre takes the map away (the picture is magenta now), and only frame_change_post gives a valid one back.
 render_post, which comes when the picture has been written, only makes sure that this happened.
+
+Other add-ons move things in frame_change_post too, and Blender evaluates once more when all handlers have run, without
+calling them again. So ours waits until the others have run, and evaluates what they have changed.
 """
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 import bpy
 
-from ..bake import baking
+from ..bake import baking, check
 from ..core import messages
 from ..core.errors import SceneError, unexpected
 from ..core.physics_api import physics
@@ -24,6 +27,7 @@ from ..outputs import frames, refreshing, registry, saving
 from ..outputs.shared import disk_light
 from ..preview import live_preview
 from ..scene import frame_setup
+from ..scene.placement import placement
 from ..settings import saved_names
 
 Handler = TypeVar("Handler", bound=Callable[..., None])
@@ -44,7 +48,18 @@ class _Render:
     """An error was shown for this render."""
     is_noted: bool = False
     """The unstable orbit was mentioned in this render."""
+    shown: "physics.WarpMapParameters | None" = None
+    """What the current frame's map is made from, once it is there."""
+    files: dict[Path, object] = field(default_factory=dict)
+    """The maps that it shows, as they were when they were checked."""
+    placed: object = None
+    """How hole and camera stood then."""
+    turns: int = 0
+    """How often the handler has let others go first in this frame."""
 
+
+# Other add-ons may insist on being the last as well; and what they move may move on with each evaluation.
+MOST_TURNS, MOST_ROUNDS = 4, 4
 
 _renders = SESSION.per_scene(_Render, Life.FILE)
 # True while this module itself steps the scene to other frames.
@@ -112,7 +127,9 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
         return
     if messages.is_ending():
         messages.end_process(SceneError("A frame before this one failed.", code="render.frame-failed").for_user())
-    _renders.of(scene).is_waiting = True
+    now = _renders.of(scene)
+    now.is_waiting, now.shown, now.turns = True, None, 0
+    _come_first("render_post", on_render_post)  # before others put back what they have moved for the frame
     _guarded(output.take_away, scene)
 
 
@@ -126,8 +143,12 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     if depsgraph.mode != "RENDER" and not now.is_running:
         disk_light.follow(scene, frame_setup.find_active_hole(scene))
         registry.of(scene).follow(scene, depsgraph)
-    if depsgraph.mode == "RENDER" and now.is_waiting:
+    if depsgraph.mode != "RENDER" or not (now.is_waiting or now.shown) or _lets_others_go_first(now):
+        return
+    if now.is_waiting:
         _guarded(lambda each: _provide_maps(each, depsgraph), scene)
+    else:
+        _guarded(lambda each: _check_layer(each, depsgraph), scene)
 
 
 @persistent
@@ -143,9 +164,15 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph |
 @persistent
 def on_render_post(scene: bpy.types.Scene, _unused: object = None) -> None:
     """The frame is done."""
-    if _renders.of(scene).is_waiting:
+    now = _renders.of(scene)
+    if now.is_waiting:
         text = f"Frame {scene.frame_current} was rendered without its warp map or lens."
         _fail(scene, SceneError(text, code="render.no-map"))
+    elif now.shown is not None:
+        _guarded(_check_files, scene)
+        if now.placed != _placed(scene):
+            _guarded(_check_frame, scene)
+    now.shown = None
 
 
 @persistent
@@ -173,14 +200,111 @@ def _steps() -> Iterator[None]:
 
 def _provide_maps(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Make sure that the maps of the frame being rendered are right, and let its picture read them."""
-    with _steps():
-        frame = frames.read(scene, depsgraph)
+    frame, depsgraph = _read(scene, depsgraph)
+    frames.check_sky(scene)
     _note_unstable_orbit(scene, frame.parameters)
+    files: dict[Path, object] = {}
     for wanted in frames.requests_of(scene, frame):
-        baking.provide(wanted, may_bake=scene.umbra.auto_bake)
+        files |= baking.provide(wanted, may_bake=scene.umbra.auto_bake)
     for warning in registry.of(scene).point_at(scene, depsgraph, frame):
         messages.warn(warning)
-    _renders.of(scene).is_waiting = False
+    now = _renders.of(scene)
+    now.shown, now.placed, now.files, now.is_waiting = frame.parameters, _placed(scene), files, False
+
+
+# --- beside other add-ons -------------------------------------------------------------------------
+
+
+def _come_first(name: str, handler: Callable[..., None]) -> None:
+    attached = getattr(bpy.app.handlers, name)
+    if attached[0] is not handler:
+        attached.remove(handler)
+        attached.insert(0, handler)
+
+
+def _lets_others_go_first(now: _Render) -> bool:
+    """Whether handlers come after this one, which is then called once more after them."""
+    attached = bpy.app.handlers.frame_change_post
+    if attached[-1] is not on_frame_change_post:
+        now.turns += 1
+        if now.turns <= MOST_TURNS:
+            attached.append(on_frame_change_post)
+        return now.turns <= MOST_TURNS
+    while attached.count(on_frame_change_post) > 1:  # only the last may do so: Blender goes through the list by number
+        attached.remove(on_frame_change_post)
+    return False
+
+
+def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[frame_setup.FrameSetup, bpy.types.Depsgraph]:
+    """The frame as it will be rendered, and a graph in which it is evaluated.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        If the frame is impossible, or another add-on moves hole or camera without end.
+    """
+    with _steps():
+        if len(bpy.app.handlers.frame_change_post) == 1:  # nobody else has changed anything
+            return frames.read(scene, depsgraph), depsgraph
+        if scene.render.use_persistent_data:
+            # an update would take from Cycles what has changed in this frame
+            layer = scene.view_layers.get(depsgraph.view_layer.name) or scene.view_layers[0]
+            return frames.read_at(scene, scene.frame_current, layer), layer.depsgraph
+        depsgraph.update()
+        frame = frames.read(scene, depsgraph)
+        for _ in range(MOST_ROUNDS):
+            depsgraph.update()
+            before, frame = frame, frames.read(scene, depsgraph)
+            if frame.parameters == before.parameters:
+                return frame, depsgraph
+    raise SceneError(
+        "Another add-on or script moves the black hole or the camera with each evaluation, so that no map can fit: "
+        "switch it off.",
+        code="render.moved",
+    )
+
+
+def _placed(scene: bpy.types.Scene) -> object:
+    objects = (frame_setup.find_active_hole(scene), scene.camera)
+    return placement(each for each in objects if each is not None)
+
+
+def _check_layer(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Refuse a further view layer in which hole or camera are elsewhere than in the one before."""
+    try:
+        frame, _ = _read(scene, depsgraph)
+    except physics.BlackHoleError as error:
+        if error.code == "hole.excluded":  # the layer does without it
+            return
+        raise
+    _compare(scene, frame)
+
+
+def _check_frame(scene: bpy.types.Scene) -> None:
+    """Refuse a frame in which somebody has moved hole or camera while it was rendered."""
+    with _steps():
+        frame = frames.read_at(scene, scene.frame_current)
+    _compare(scene, frame)
+
+
+def _compare(scene: bpy.types.Scene, frame: frame_setup.FrameSetup) -> None:
+    if frame.parameters != _renders.of(scene).shown:
+        raise SceneError(
+            "The black hole or the camera was moved after its warp map was made, by another add-on or a script: "
+            "switch it off, and render this frame again.",
+            code="render.moved",
+        )
+
+
+def _check_files(scene: bpy.types.Scene) -> None:
+    """Refuse a frame whose maps were not the same files, all through the render, as those that were checked."""
+    for path, stamp in _renders.of(scene).files.items():
+        if check.stamp(path) != stamp:
+            raise SceneError(
+                f"The map {path} was changed or removed while the frame was rendered, and the picture may be wrong: "
+                "render the frame again.",
+                code="render.map-changed",
+            )
 
 
 def _note_unstable_orbit(scene: bpy.types.Scene, parameters: "physics.WarpMapParameters") -> None:
@@ -264,6 +388,6 @@ def unregister() -> None:
     """Detach the handlers."""
     for name, handler in _HANDLERS.items():
         attached = getattr(bpy.app.handlers, name)
-        if handler in attached:
+        while handler in attached:
             attached.remove(handler)
     messages.forget()

@@ -19,7 +19,7 @@ from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
-from . import rotations
+from . import drivers, rotations
 from .camera_type import original_type
 from .rotations import Matrix, Vector
 
@@ -169,7 +169,13 @@ def pose(evaluated: bpy.types.Object, what: str, *, keep_scale: bool) -> Pose:
     """
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
     lengths = rotations.length(matrix[:3, :3])
-    if not np.all(np.isfinite(matrix)) or lengths.min() <= 0.0:
+    if not np.all(np.isfinite(matrix)):
+        raise SceneError(
+            f'{what} "{evaluated.name}" is at a place, or of a size, that is not a number: mend its location, rotation '
+            "and scale, and those of its parents.",
+            code="hole.not-finite",
+        )
+    if lengths.min() <= 0.0:
         raise SceneError(
             f'{what} "{evaluated.name}" has a scale of zero: set its scale to a positive number.',
             code="hole.scale-zero",
@@ -442,6 +448,8 @@ def read(
     hole = active_hole(scene)
     _check_evaluated(hole, depsgraph)
     camera = active_camera(scene)
+    drivers.check(scene, scene.frame_current, depsgraph, ("umbra.", "render."))
+    drivers.check_objects((hole, camera), scene.frame_current, depsgraph)
 
     evaluated_hole = hole.evaluated_get(depsgraph)
     evaluated_camera = camera.evaluated_get(depsgraph)

@@ -99,9 +99,8 @@ def lines(scene: bpy.types.Scene) -> list[status.Line]:
     if told is None or told.listing is None:
         return [status.Line("Not verified yet", "QUESTION")]
     found = [status.Line(f"{len(told.listing.frames)} frames, {told.listing.size / 1e6:.1f} MB at {told.when}", "FILE")]
-    icons = {State.VALID: "CHECKMARK", State.MISSING: "RADIOBUT_OFF", State.STALE: "FILE_REFRESH"}
-    for state in State:
-        count = told.listing.counts[state]
+    icons: dict[str, str] = {State.VALID: "CHECKMARK", State.MISSING: "RADIOBUT_OFF", State.STALE: "FILE_REFRESH"}
+    for state, count in told.listing.counts.items():
         if count:
             found.append(status.Line(f"{count} {state}", icons.get(state, "ERROR")))
     if told.listing.leftovers:

@@ -57,6 +57,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
         # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
         depsgraph = context.evaluated_depsgraph_get()
         now = frames.read(scene, depsgraph, False)
+        frames.check_sky(scene)
         notices = registry.of(scene).notices(scene, depsgraph, now)
     except physics.BlackHoleError as error:
         return wrapped(error.for_user(), "ERROR")

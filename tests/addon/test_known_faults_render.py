@@ -6,14 +6,13 @@ Other add-ons, the sequencer, a studio's colors, another processor, and a Blende
 
 import platform
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, read, refused, render, run_python
+from small_scene import add_hole, read, render, run_python
 
 BEGIN = """
 import os
@@ -37,27 +36,6 @@ def chooses_kernels() -> bool:
         return False
     flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split()
     return "avx2" in flags and "fma" in flags
-
-
-@pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="The map is baked before later handlers have moved the camera."
-)
-def test_another_addon_moves_the_camera_after_us(tmp_path: Path, addon_module: Callable[[str], ModuleType]) -> None:
-    """Blender renders from the new place: the map is of that place too, or the render is refused."""
-    change = """
-def move(scene, *_):
-    scene.camera.location = (5.0 + scene.frame_current, -7.0, 5.0)
-bpy.app.handlers.frame_change_post.append(move)
-bpy.ops.render.render(animation=True)
-os._exit(0)
-"""
-    result = run_python(BEGIN.format(folder=str(tmp_path)) + change)
-    if refused(result):
-        return
-    physics = addon_module("core.physics_api").physics
-    maps = sorted((tmp_path / "maps").glob("*.exr"))
-    places = [physics.read_warp_map_metadata(each)["parameters"]["camera_position"] for each in maps]
-    np.testing.assert_allclose(places, [(6.0, -7.0, 5.0), (7.0, -7.0, 5.0)], rtol=1e-6)
 
 
 def test_a_strip_in_the_sequencer_is_named(tmp_path: Path) -> None:

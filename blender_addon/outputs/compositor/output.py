@@ -13,7 +13,7 @@ from ...scene import environment
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
-from ..shared.compositor_tree import check_linked, check_rendered, find_setup, find_tree, is_in_use
+from ..shared.compositor_tree import check_linked, check_rendered, check_unmuted, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
 from . import compositing, compositor_sync, disk, panel
@@ -157,6 +157,7 @@ class CompositorOutput(Output):
         sequencer.check(scene)
         check_rendered(scene)
         check_linked(scene)
+        check_unmuted(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let the group read the frame's map."""

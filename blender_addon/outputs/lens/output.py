@@ -13,7 +13,7 @@ from ...scene.frame_setup import FrameSetup
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
-from ..shared.compositor_tree import find_tree
+from ..shared.compositor_tree import check_unmuted, find_tree
 from ..shared.look import look_of_scene
 from ..shared.tree_editing import check_shared
 from . import foreground, lens_camera, lens_disk, lens_objects, lens_shader, lens_sync, lens_tree, panel
@@ -124,6 +124,8 @@ class LensOutput(Output):
         lens_sync.break_camera(scene)
         lens_disk.point_at_nothing(scene)
         sequencer.check(scene)
+        if lens_disk.is_in_use(scene):
+            check_unmuted(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Give the camera the frame's parameters and its map."""

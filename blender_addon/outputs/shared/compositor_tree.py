@@ -110,6 +110,31 @@ def check_linked(scene: bpy.types.Scene) -> None:
         )
 
 
+def check_unmuted(scene: bpy.types.Scene) -> None:
+    """Refuse a compositor in which our nodes, or links between them, are muted: they hand on something else.
+
+    A group that is muted itself is switched off, which `is_in_use` knows.
+
+    Raises
+    ------
+    SceneError
+        The sentence names the node.
+    """
+    tree = find_tree(scene)
+    ours = (
+        [node for node in tree.nodes if node.get(ROLE) not in (None, RENDER_LAYER, OUTPUT)] if tree is not None else []
+    )
+    for node in ours:
+        fed = any(socket.is_linked for socket in node.outputs)
+        origins = [link for socket in node.inputs for link in socket.links if link.from_node in ours]
+        if (node.mute and fed) or any(link.is_muted for link in origins):
+            raise SceneError(
+                f'The node "{node.name}" in the compositor of scene "{scene.name}", or a link to it, is muted: unmute '
+                "it (M over a node, Ctrl Alt and the right mouse button across a link).",
+                code="compositor.muted",
+            )
+
+
 def render_layers(tree: bpy.types.NodeTree, scene: bpy.types.Scene) -> list[bpy.types.Node]:
     """The Render Layers nodes of a scene in a compositor tree."""
     return [node for node in tree.nodes if node.type == "R_LAYERS" and node.scene in (None, scene)]

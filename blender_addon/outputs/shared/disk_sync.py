@@ -15,7 +15,7 @@ from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
 from .compositor_tree import ROLE, find_node, find_tree
-from .map_images import read_sequence
+from .map_images import keep_as_data, read_sequence
 
 DISK = "disk"
 PICTURE_ROLES = {picture.socket: picture.role for picture in disk_images.PICTURES.values()}
@@ -210,6 +210,8 @@ def _follow_settings(tree: bpy.types.NodeTree, node: bpy.types.Node, hole: bpy.t
         reader, image = find_node(tree, picture.role), picture.image(settings)
         if reader is not None and reader.image != image:
             reader.image = image
+        if image != settings.texture:
+            keep_as_data(image)
 
 
 def _follow_time(

@@ -24,9 +24,17 @@ def map_image(name: str) -> bpy.types.Image:
     image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP
-    color_spaces.mark_as_data(image)
-    image.alpha_mode = "CHANNEL_PACKED"  # alpha is data, not a mask of the other channels
+    keep_as_data(image)
     return image
+
+
+def keep_as_data(image: bpy.types.Image) -> None:
+    """Let Blender read a map's numbers as they are, whatever its image was set to by hand."""
+    color_spaces.mark_as_data(image)
+    if image.alpha_mode != "CHANNEL_PACKED":  # alpha is data, not a mask of the other channels
+        image.alpha_mode = "CHANNEL_PACKED"
+    if image.use_half_precision:
+        image.use_half_precision = False
 
 
 def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
@@ -36,5 +44,6 @@ def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
     for name, value in SEQUENCE_SETTINGS.items():
         if getattr(node, name) != value:
             setattr(node, name, value)
+    keep_as_data(node.image)
     if node.image.filepath != path:
         node.image.filepath = path

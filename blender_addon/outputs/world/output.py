@@ -7,6 +7,7 @@ from ...bake.kinds import WORLD_MAP
 from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
+from ...nodes import world_group
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
 from ..shared import sequencer
@@ -135,6 +136,9 @@ def check_world(scene: bpy.types.Scene) -> None:
     """
     if lensed_world.lensed_world(scene) is None:
         raise SceneError(ANOTHER_WORLD.format(scene.name), code="sky.world-changed")
+    node = lensed_world.group_node(scene.world)
+    if node is not None:
+        _check_used(scene, node)
     for layer in scene.view_layers:
         if layer.use and getattr(layer, "world_override", None) is not None:
             raise SceneError(
@@ -142,6 +146,19 @@ def check_world(scene: bpy.types.Scene) -> None:
                 "Properties, or choose another output.",
                 code="sky.world-override",
             )
+
+
+def _check_used(scene: bpy.types.Scene, node: bpy.types.Node) -> None:
+    needed = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.TINT, world_group.FAULT)]
+    links = [link for socket in needed for link in socket.links]
+    muted = node.mute or any(link.is_muted or link.to_node.mute for link in links)
+    if muted or not all(socket.is_linked for socket in needed[1:]):
+        raise SceneError(
+            f'The node "{node.name}" in World "{scene.world.name if scene.world else ""}", or what it feeds, is muted '
+            "or cut off: unmute it (M) and connect its Vector, Tint and Fault again, or choose another output and then "
+            "Output: World.",
+            code="sky.group-cut",
+        )
 
 
 def _check_resolved(wanted: MapRequest, frame: FrameSetup) -> None:

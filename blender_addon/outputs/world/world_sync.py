@@ -14,7 +14,7 @@ from ...nodes import world_group
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
 from ..shared.look import look_of_group, write_to_group
-from ..shared.map_images import NO_MAP, SEQUENCE_SETTINGS, map_image
+from ..shared.map_images import NO_MAP, SEQUENCE_SETTINGS, keep_as_data, map_image
 from . import lensed_world
 
 FILE_IMAGE_NAME, LIVE_IMAGE_NAME = "Umbra World Map", "Umbra Live Map"
@@ -93,7 +93,6 @@ def _file_image(scene: bpy.types.Scene) -> bpy.types.Image | None:
     present = _own(world, lensed_world.FILE_IMAGE)
     if present is None:
         present = map_image(FILE_IMAGE_NAME)
-        present.use_half_precision = False
         world[lensed_world.FILE_IMAGE] = present
     return present
 
@@ -102,6 +101,9 @@ def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
     image = _file_image(scene)
     if image is None:
         return
+    keep_as_data(image)
+    if image.source != "SEQUENCE":
+        image.source = "SEQUENCE"
     if image.filepath != path:
         image.filepath = path
     _point(scene, image)
