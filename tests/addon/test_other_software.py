@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Known faults beside other software, not yet mended: each test says what should be, and fails until it is.
-
-Other add-ons, the sequencer, a studio's colors, another processor, and a Blender without this add-on.
-"""
+"""Beside other software: the sequencer, a studio's colors, another processor, and a Blender without this add-on."""
 
 import platform
 import sys
