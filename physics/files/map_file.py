@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..images.exr import PathLike, read_channels, read_exr_header, write_channels
 from ..numerics.errors import ImageFileError, WarpMapError
-from ..shot.identity import BAKE_VERSION, version_of
+from ..shot.identity import bake_version, version_of
 from ..shot.map_parameters import WarpMapParameters
 
 CHANNELS = ("R", "G", "B", "A")
@@ -233,7 +233,7 @@ def identity_of(stated: str, made_from: WarpMapParameters, parameters: Mapping[s
     version = version_of(stated, parameters)
     if version is None:
         return None
-    return made_from.hash if version == BAKE_VERSION else stated
+    return made_from.hash if version == bake_version(parameters) else stated
 
 
 def _check(made_from: WarpMapParameters) -> None:

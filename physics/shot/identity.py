@@ -14,8 +14,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-# Raised whenever the same parameters would give other pixels, so that maps baked before count as stale.
-BAKE_VERSION = 1
+# Raised whenever the same parameters would give other pixels, so that maps baked before count as stale: of maps without
+# a disk, and of those with one. With version 1, light of negative energy met the disk at wrong azimuths.
+BAKE_VERSION, DISK_BAKE_VERSION = 1, 2
 
 # Decimals that are hashed, of what is worked out from matrices: rotations and velocities have noise of 1e-15, positions
 # of 1e-15 times the distance, up to 1e-9 M for a camera a million M away.
@@ -29,22 +30,28 @@ NOISE = 4e-7
 _EXACT = frozenset({"tolerance", "interpolation"})
 
 
-def hash_of(values: Mapping[str, Any], version: int = BAKE_VERSION) -> str:
+def bake_version(values: Mapping[str, Any]) -> int:
+    """Return the version of the maps that are made from these parameters today."""
+    return DISK_BAKE_VERSION if values.get("disk") else BAKE_VERSION
+
+
+def hash_of(values: Mapping[str, Any], version: int | None = None) -> str:
     """Return the hash of a map's parameters.
 
     Parameters
     ----------
     values : mapping
         Parameters as plain JSON values, from `WarpMapParameters.to_metadata`.
-    version : int
-        Of what is made from them.
+    version : int, optional
+        Of what is made from them; today's by default.
 
     Returns
     -------
     str
         SHA-256, in hexadecimal, of the rounded parameters and of the version of what is made from them.
     """
-    return _digest({name: _rounded(value, _DECIMALS.get(name)) for name, value in values.items()}, version)
+    rounded = {name: _rounded(value, _DECIMALS.get(name)) for name, value in values.items()}
+    return _digest(rounded, bake_version(values) if version is None else version)
 
 
 def version_of(text: str, values: Mapping[str, Any]) -> int | None:
@@ -57,7 +64,7 @@ def version_of(text: str, values: Mapping[str, Any]) -> int | None:
     values : mapping
         The header's parameters.
     """
-    for version in range(BAKE_VERSION, 0, -1):
+    for version in range(bake_version(values), 0, -1):
         if text in (hash_of(values, version), _digest(values, version)):
             return version
     return None

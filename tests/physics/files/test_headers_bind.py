@@ -143,10 +143,18 @@ def test_another_shots_parameters_do_not_pass(maps, tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["warp", "disk", "exit", "world"])
 def test_maps_of_version_0_1_0_are_read(maps, tmp_path, kind):
-    """They have the hash of all digits of their parameters, and no checksum of the header."""
+    """They have the hash of all digits of their parameters, and no checksum of the header.
+
+    Those with a disk keep their hash: they were baked by the first version of the disk, and are out of date.
+    """
     read, path = maps[kind]
-    rewritten(path, tmp_path / "map.exr", umbraHash=hash_of(stated(path)), umbraHeaderChecksum=None)
-    assert read(tmp_path / "map.exr").metadata == read(path).metadata
+    parameters = stated(path)
+    former = hash_of(parameters)
+    rewritten(path, tmp_path / "map.exr", umbraHash=former, umbraHeaderChecksum=None)
+    expected = {**read(path).metadata}
+    if parameters.get("disk"):
+        expected["hash"] = former
+    assert read(tmp_path / "map.exr").metadata == expected
 
 
 def test_a_header_cannot_make_the_check_of_accuracy_endless(maps, tmp_path, capsys):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from physics import Disk, PanoramaCamera, PerspectiveCamera, WarpMapParameters, looking_at_hole
-from physics.shot.identity import BAKE_VERSION, agree, hash_of, version_of
+from physics.shot.identity import BAKE_VERSION, DISK_BAKE_VERSION, agree, hash_of, version_of
 
 PLACE = (9.0, -4.0, 2.5)
 BASE = WarpMapParameters(
@@ -118,6 +118,8 @@ def test_hashes_of_version_0_1_0_are_known() -> None:
     written = "15d64bc2658d99a4342b9cbf2a0c3d575ae74c5b1afed747783ced1895331cec"
     assert hash_of(values) != written
     assert version_of(hash_of(values), values) == version_of(written, values) == BAKE_VERSION
+    disk = BASE.to_metadata()
+    assert version_of(hash_of(disk, 1), disk) == 1 < DISK_BAKE_VERSION == version_of(hash_of(disk), disk)
     for text in (hash_of({**values, "spin": 0.5}), hash_of(values, BAKE_VERSION + 1), ""):
         assert version_of(text, values) is None
     assert version_of(written, {**values, "spin": 0.5}) is None
