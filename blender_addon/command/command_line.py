@@ -4,6 +4,7 @@
 import argparse
 import contextlib
 import json
+import os
 import sys
 import traceback
 from collections.abc import Callable, Generator, Sequence
@@ -62,7 +63,10 @@ def run(arguments: Sequence[str]) -> int:
         except Exception as error:  # noqa: BLE001  (Blender would print it and go on)
             traceback.print_exc()
             return out.fail(unexpected(error))
-        out.event("end", status=status, **summary)
+        try:
+            out.event("end", status=status, **summary)
+        except SceneError as error:
+            return out.fail(error)
     return status
 
 
@@ -76,18 +80,48 @@ class Output:
 
     def line(self, text: str) -> None:
         """Print a line for people; where standard output is for JSON, on standard error."""
-        print(f"Umbra: {text}", file=self._people, flush=True)
+        self._print(f"Umbra: {text}", self._people)
 
     def event(self, event: str, **values: object) -> None:
         """Print a JSON object on a line of its own."""
         if self._json is not None:
-            print(json.dumps({"event": event, **values}), file=self._json, flush=True)
+            self._print(json.dumps({"event": event, **values}), self._json)
 
     def fail(self, error: "physics.BlackHoleError") -> int:
         """Say why the command has failed; return the exit status."""
-        print(f"error: {error.for_user()}", file=sys.stderr, flush=True)
-        self.event("end", status=FAILED, error=str(error), code=error.code)
+        with contextlib.suppress(SceneError):  # nobody listens any more
+            self._print(f"error: {error.for_user()}", sys.stderr)
+            self.event("end", status=FAILED, error=str(error), code=error.code)
         return FAILED
+
+    @staticmethod
+    def _print(text: str, stream: TextIO) -> None:
+        """Print a line at once, with escapes for what the stream cannot encode.
+
+        Raises
+        ------
+        SceneError
+            If it is closed, or its device is full.
+        """
+        encoding = getattr(stream, "encoding", None) or "utf-8"
+        try:
+            print(text.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
+        except (OSError, ValueError) as error:
+            if stream is sys.stdout:
+                _lead_nowhere(stream)
+            reason = (getattr(error, "strerror", None) or str(error)).lower()
+            raise SceneError(
+                f"The command's output cannot be written: {reason}; let it lead to a file or a program that takes it.",
+                code="command.standard-output",
+            ) from error
+
+
+def _lead_nowhere(stream: TextIO) -> None:
+    """Have the end of the process not fail to write once more what could not be written."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 # A command's exit status, and what its last line of JSON says.

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import bpy
 import pytest
-from small_scene import add_hole, find_map
+from small_scene import add_hole, find_map, run_python
 
 
 @pytest.fixture
@@ -129,3 +129,30 @@ def test_nothing_to_bake_is_no_failure(scene: bpy.types.Scene, run: Callable[[st
     bpy.ops.umbra.set_output(output="CYCLES_LENS")
     scene.umbra.lens_rays = "IN_SHADER"
     assert run("bake") == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("command", [["bake"], ["bake", "--json"], ["status", "--json"], ["clean"]])
+def test_output_that_cannot_be_written(scene: bpy.types.Scene, tmp_path: Path, command: list[str]) -> None:
+    """One sentence and status 1: a full device, and a pipe that nobody reads."""
+    add_hole(scene)
+    blend = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    script = f"""
+import os
+bpy.ops.wm.open_mainfile(filepath={blend!r})
+target = os.open("/dev/full", os.O_WRONLY) if {{full}} else os.pipe()[1]
+if not {{full}}:
+    reading, target = os.pipe()
+    os.close(reading)
+os.dup2(target, 1)
+from bl_ext.user_default.umbra_black_hole.command import command_line
+status = command_line.run({command!r})
+sys.stderr.flush()
+os._exit(status)
+"""
+    for full in (True, False):
+        result = run_python(script.format(full=full))
+        assert result.returncode == 1
+        assert "Traceback" not in result.stderr
+        assert "[command.standard-output]" in result.stderr
