@@ -20,6 +20,7 @@ import bpy
 
 from ..bake import baking, check
 from ..core import messages
+from ..core.blender_version import SCENE_OWNS_COMPOSITOR
 from ..core.errors import SceneError, unexpected
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
@@ -54,6 +55,8 @@ class _Render:
     """The maps that it shows, as they were when they were checked."""
     placed: object = None
     """How hole and camera stood then."""
+    name: str = ""
+    """The scene's name when the render began."""
     turns: int = 0
     """How often the handler has let others go first in this frame."""
 
@@ -107,7 +110,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
         return
     if len(frame_setup.holes(scene)) > 1:
         messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
-    now.is_running = True
+    now.is_running, now.name = True, scene.name
     _guarded(output.begin_render, scene)
     _guarded(refreshing.refresh_disk, scene)
     if output.uses_compositor(scene) and bpy.app.background:
@@ -200,6 +203,7 @@ def _steps() -> Iterator[None]:
 
 def _provide_maps(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Make sure that the maps of the frame being rendered are right, and let its picture read them."""
+    _check_name(scene)
     frame, depsgraph = _read(scene, depsgraph)
     frames.check_sky(scene)
     _note_unstable_orbit(scene, frame.parameters)
@@ -293,6 +297,17 @@ def _compare(scene: bpy.types.Scene, frame: frame_setup.FrameSetup) -> None:
             "The black hole or the camera was moved after its warp map was made, by another add-on or a script: "
             "switch it off, and render this frame again.",
             code="render.moved",
+        )
+
+
+def _check_name(scene: bpy.types.Scene) -> None:
+    """Refuse a scene that was renamed since its render began, where Blender knows renders by their scenes' names."""
+    name = _renders.of(scene).name
+    if SCENE_OWNS_COMPOSITOR and name not in ("", scene.name) and registry.of(scene).uses_compositor(scene):
+        raise SceneError(
+            f'Another add-on or script has renamed the scene "{name}" to "{scene.name}" while it is rendered, and this '
+            "version of Blender's compositor does not find its picture any more: switch it off.",
+            code="render.renamed",
         )
 
 

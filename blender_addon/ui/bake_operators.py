@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bake maps from the window: work that runs beside the interface, with progress, and that Esc ends."""
 
+import time
 from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from ..core.session import SESSION, Life
 from ..outputs import frames as frame_maps
 from ..outputs import registry
 from ..scene import frame_setup
-from .reporting import TIMER_INTERVAL, only_one_is_rendered, reporting
+from .reporting import SLICE, TIMER_INTERVAL, only_one_is_rendered, reporting
 
 if TYPE_CHECKING:
     from bpy.types import Operator as _Operator
@@ -106,8 +107,11 @@ class BakeOperator(_Operator):
             return {"PASS_THROUGH"}
         if self._steps is None:
             return {"CANCELLED"}
+        until = time.perf_counter() + SLICE
         try:
             progress = next(self._steps)
+            while time.perf_counter() < until and not JOB.now.stop_asked:
+                progress = next(self._steps)
         except StopIteration as end:
             self._report(end.value)
             return self._end(context, {"FINISHED"})
@@ -153,10 +157,12 @@ class BakeOperator(_Operator):
 
 
 def _redraw(context: bpy.types.Context) -> None:
+    """Draw the sidebars, where the panel is; what the views show does not change, and may take long to draw."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES"}:
-                area.tag_redraw()
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()
 
 
 class UMBRA_OT_bake_frame(BakeOperator, bpy.types.Operator):

@@ -12,7 +12,8 @@ from ..scene import frame_setup
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
-TIMER_INTERVAL = 0.02  # seconds between steps of work that runs beside the interface
+# Seconds between two slices of work that runs beside the interface, and for which one lasts: Blender draws after each.
+TIMER_INTERVAL, SLICE = 0.01, 0.1
 
 
 def reporting(

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baking by operator: at once without a window, step by step beside one."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -256,7 +257,22 @@ def test_modal_bake(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespa
     assert window.status is None
 
 
-def test_modal_escape(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespace) -> None:
+def test_a_tick_works_for_a_while(scene: bpy.types.Scene, modal: SimpleNamespace) -> None:
+    """Blender draws its window after each tick, which takes longer than a step: there are few."""
+    add_hole(scene)
+    window = Window(scene)
+    modal.operator._begin(window)
+    begin, ticks = time.perf_counter(), 1
+    while modal.operator.modal(window, TIMER) == {"PASS_THROUGH"}:
+        ticks += 1
+    taken = time.perf_counter() - begin
+    assert ticks <= taken / modal.module.SLICE + 1.0
+
+
+def test_modal_escape(
+    scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(modal.module, "SLICE", 0.0)  # one step
     add_hole(scene)
     window = Window(scene)
     modal.operator._begin(window)
