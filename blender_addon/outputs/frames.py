@@ -16,7 +16,7 @@ from ..bake.request import MapRequest
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import scene_of
-from ..scene import drivers, environment, frame_setup
+from ..scene import drivers, environment, frame_setup, presence
 from ..scene.frame_setup import FrameSetup
 from . import registry
 from .shared import compositor_tree
@@ -61,6 +61,8 @@ def requests_of(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
 
 def requests_at(scene: bpy.types.Scene, frame: int, view_layer_name: str | None = None) -> list[MapRequest]:
     """Return all maps that any frame needs; the scene is at its current frame afterwards."""
+    if presence.is_absent(scene, frame) and frame_setup.find_active_hole(scene) is not None:
+        return []  # hidden in renders
     layer = scene.view_layers.get(view_layer_name) if view_layer_name else None
     return requests_of(scene, read_at(scene, frame, layer))
 

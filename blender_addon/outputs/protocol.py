@@ -7,7 +7,7 @@ methods must be written; the others do what suits an output that shows baked map
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -168,6 +168,13 @@ class Output(ABC):
         SceneError
             If the picture would be wrong.
         """
+
+    def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
+        """Let the frame, which has no black hole, be rendered as if the output were not there; return what undoes that.
+
+        What is returned for the first of several such frames undoes it for all.
+        """
+        return lambda: None
 
     def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
         """Bring the scene back after a render; canceled if a frame was begun and not finished."""

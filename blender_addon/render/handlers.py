@@ -27,7 +27,7 @@ from ..core.session import SESSION, Life
 from ..outputs import frames, refreshing, registry, saving
 from ..outputs.shared import disk_light
 from ..preview import live_preview
-from ..scene import frame_setup
+from ..scene import frame_setup, presence
 from ..scene.placement import placement
 from ..settings import saved_names
 
@@ -57,6 +57,8 @@ class _Render:
     """How hole and camera stood then."""
     name: str = ""
     """The scene's name when the render began."""
+    step_in: Callable[[], None] | None = None
+    """Undoes what lets a frame without a black hole be Blender's own."""
     turns: int = 0
     """How often the handler has let others go first in this frame."""
 
@@ -111,7 +113,8 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if len(frame_setup.holes(scene)) > 1:
         messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
     now.is_running, now.name = True, scene.name
-    _guarded(output.begin_render, scene)
+    if frame_setup.holes(scene):
+        _guarded(output.begin_render, scene)
     _guarded(refreshing.refresh_disk, scene)
     if output.uses_compositor(scene) and bpy.app.background:
         device = getattr(scene.render, "compositor_device", "CPU")
@@ -132,6 +135,11 @@ def on_render_pre(scene: bpy.types.Scene, _unused: object = None) -> None:
         messages.end_process(SceneError("A frame before this one failed.", code="render.frame-failed").for_user())
     now = _renders.of(scene)
     now.is_waiting, now.shown, now.turns = True, None, 0
+    if presence.is_absent(scene):
+        now.is_waiting = False
+        _guarded(_stand_aside, scene)
+        return
+    _step_in(now)
     _come_first("render_post", on_render_post)  # before others put back what they have moved for the frame
     _guarded(output.take_away, scene)
 
@@ -161,6 +169,7 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph |
         return
     live_preview.on_update(scene, depsgraph)
     if not _renders.of(scene).is_running:
+        disk_light.remove_orphans(scene)
         registry.of(scene).follow(scene, depsgraph)
 
 
@@ -184,12 +193,26 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
     now = _renders.of(scene)
     if now.device is not None:
         scene.render.compositor_device, now.device = now.device, None
+    _step_in(now)
     SESSION.end(Life.RENDER)
     live_preview.resume()
     if now.is_running:
         now.is_running = False
         canceled, now.is_waiting = now.is_waiting, False
         registry.of(scene).end_render(scene, canceled=canceled)
+
+
+def _stand_aside(scene: bpy.types.Scene) -> None:
+    """Let a frame without a black hole be rendered as if the add-on were not there."""
+    now = _renders.of(scene)
+    step_in = registry.of(scene).stand_aside(scene)
+    now.step_in = now.step_in or step_in
+
+
+def _step_in(now: _Render) -> None:
+    if now.step_in is not None:
+        now.step_in()
+        now.step_in = None
 
 
 @contextlib.contextmanager

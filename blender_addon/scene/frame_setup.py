@@ -21,6 +21,7 @@ from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
 from . import drivers, rotations
 from .camera_type import original_type
+from .enabled import is_enabled
 from .rotations import Matrix, Vector
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
@@ -86,15 +87,12 @@ def holes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def find_active_hole(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The hole that is rendered: the chosen one, or the only one; None where there is neither."""
+    """The hole that is rendered: the chosen one while it is there, or the only one; None where there is neither."""
     chosen = scene.umbra.active_hole
     if chosen is not None and chosen.umbra.is_black_hole and scene in chosen.users_scene:
         return chosen
-    if chosen is None:
-        found = holes(scene)
-        if len(found) == 1:
-            return found[0]
-    return None
+    found = holes(scene)
+    return found[0] if len(found) == 1 else None
 
 
 def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -144,6 +142,13 @@ def _check_evaluated(hole: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
             f'The black hole "{hole.name}" is in a collection that view layer "{layer.name}" excludes, so '
             "Blender does not move it: include that collection.",
             code="hole.excluded",
+        )
+    if not is_enabled(hole, layer.layer_collection, "hide_render" if rendering else "hide_viewport"):
+        where = "renders" if rendering else "viewports"
+        raise SceneError(
+            f'The black hole "{hole.name}" is in a collection that is disabled in {where}, so Blender does not move '
+            "it: enable that collection in the Outliner.",
+            code="hole.disabled",
         )
 
 

@@ -13,7 +13,7 @@ from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.shared import drawing
-from ..scene import frame_setup
+from ..scene import frame_setup, presence
 from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
 
@@ -53,6 +53,8 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     scene = context.scene
     if frame_setup.find_active_hole(scene) is None and scene.umbra.active_hole is None and not frame_setup.holes(scene):
         return wrapped("This scene has no black hole.", "INFO")
+    if presence.is_absent(scene):
+        return wrapped("The black hole is hidden in renders or deleted: pictures show the plain scene.", "INFO")
     try:
         # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
         depsgraph = context.evaluated_depsgraph_get()

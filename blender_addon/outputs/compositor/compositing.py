@@ -201,6 +201,13 @@ def remove(scene: bpy.types.Scene) -> None:
         del scene[BEFORE]
 
 
+def film_before(scene: bpy.types.Scene) -> bool:
+    """Whether the film was transparent before the set-up."""
+    kept = scene.get(BEFORE)
+    before = kept.to_dict() if hasattr(kept, "to_dict") else {}
+    return bool(before.get("film_transparent", False))
+
+
 def _restore(render: bpy.types.RenderSettings, name: str, value: object) -> None:
     """Set a setting back, unless what was kept of it has been overwritten with something else since."""
     is_text = isinstance(getattr(render, name), str)

@@ -11,7 +11,7 @@ from ...nodes import black_hole_group
 from ...scene import environment, frame_setup
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
-from ..shared.map_images import NO_MAP, read_sequence
+from ..shared.map_images import NO_MAP, plain_map, read_sequence
 from . import disk
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
@@ -79,6 +79,11 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the map node read no map at all: the picture is magenta until a valid map is in place."""
     _set_map_path(scene, folder(scene).blender_path + NO_MAP)
+
+
+def point_at_plain_map(scene: bpy.types.Scene) -> None:
+    """Let the map node read, at this frame, a map that bends nothing, and no disk."""
+    _set_map_path(scene, plain_map(scene.frame_current))
 
 
 def _set_map_path(scene: bpy.types.Scene, path: str) -> None:

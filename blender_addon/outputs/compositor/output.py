@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Output: Compositor, as the rest of the add-on knows it."""
 
+from collections.abc import Callable
+
 import bpy
 
 from ...bake.kinds import WARP_MAP
@@ -166,6 +168,21 @@ class CompositorOutput(Output):
         disk_sync.check_shot(scene, frame.parameters)
         compositor_sync.point_at_maps(scene)
         return warnings
+
+    def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
+        """Let the film be as it was before the set-up: where it is not transparent, the group shows the render alone.
+
+        Links and values of the compositor's nodes would change a frame too late.
+        """
+        film = scene.render.film_transparent
+        scene.render.film_transparent = compositing.film_before(scene)
+        compositor_sync.point_at_plain_map(scene)
+
+        def undo() -> None:
+            scene.render.film_transparent = film
+            self.refresh(scene)
+
+        return undo
 
     def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
         """After a failure the map stays away.

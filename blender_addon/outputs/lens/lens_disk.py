@@ -5,6 +5,7 @@ All that the lens shows is behind the disk: a bent ray begins outside of the len
 picture of the render layer goes through the group "Umbra Disk" before it goes where it went.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import bpy
@@ -19,7 +20,7 @@ from ...nodes import disk_group
 from ...scene import frame_setup
 from ..shared import disk_sync, tree_editing
 from ..shared.compositor_tree import find_node, find_tree, has_scene_tree, render_layers
-from ..shared.map_images import NO_MAP
+from ..shared.map_images import NO_MAP, plain_map
 from . import lens_tree
 
 
@@ -41,7 +42,7 @@ def put_in(scene: bpy.types.Scene) -> bpy.types.Node:
     if layer is None:
         layer = layers[0] if layers else tree_editing.add_render_layer(tree, scene)
     picture = layer.outputs["Image"]
-    fed = [link.to_socket for link in picture.links]
+    fed = [link.to_socket for link in picture.links if tree_editing.leads_to_picture(link.to_node)]
     tree.links.new(picture, node.inputs[disk_group.BEHIND])
     for socket in fed:
         tree.links.new(node.outputs[disk_group.IMAGE], socket)
@@ -61,6 +62,14 @@ def take_out(scene: bpy.types.Scene) -> None:
         tree_editing.give_back(tree, node, disk_group.BEHIND)
         disk_sync.remove(tree)
     lens_tree.release(scene)
+
+
+def stand_aside(scene: bpy.types.Scene) -> Callable[[], None]:
+    """Let the disk's nodes read passes of a disk that is nowhere; return what undoes that."""
+    tree = find_tree(scene)
+    if tree is not None:
+        disk_sync.point_passes(tree, plain_map(scene.frame_current))
+    return lambda: point_at_passes(scene)
 
 
 def refresh(scene: bpy.types.Scene) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Output: Cycles Lens, as the rest of the add-on knows it."""
 
+from collections.abc import Callable
+
 import bpy
 
 from ...bake.kinds import EXIT_MAP
@@ -9,6 +11,7 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
 from ...scene import frame_setup
+from ...scene.camera_type import is_converted
 from ...scene.frame_setup import FrameSetup
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
@@ -139,6 +142,20 @@ class LensOutput(Output):
         path = _exit_map(scene, frame).path if lens_sync.uses_maps(scene) else None
         lens_sync.show(scene, frame, path)
         return warnings
+
+    def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
+        """Let the cameras be what they were, and the picture go past the disk."""
+        cameras = [each for each in lens_camera.cameras_of(scene) if is_converted(each)]
+        for camera in cameras:
+            lens_camera.restore(camera)
+        link_back = lens_disk.stand_aside(scene)
+
+        def undo() -> None:
+            for camera in cameras:
+                lens_camera.convert(camera)
+            link_back()
+
+        return undo
 
     def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
         """Let the viewport see the scene again, which needs no map."""

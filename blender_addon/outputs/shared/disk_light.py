@@ -15,7 +15,7 @@ from ...core import color_spaces
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.physics_api import physics
 from ...nodes import disk_images
-from ...scene import disk_animation
+from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
 
 NAME = "Umbra Disk Light"
@@ -55,6 +55,8 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     except physics.BlackHoleError:
         return  # whoever reads the shot says so
     light = present or _add(scene, hole)
+    if light.animation_data is None:  # made by version 0.1.0
+        _hide_with(hole, light)
     picture = settings.texture if disk_properties.shows_picture(settings) else None
     made_from = repr((spin, disk, look, None if picture is None else (picture.name, tuple(picture.size))))
     if light.data.get(_MADE_FROM) != made_from:
@@ -133,9 +135,27 @@ def _add(scene: bpy.types.Scene, hole: bpy.types.Object) -> bpy.types.Object:
     light.display_type = "WIRE"
     light.visible_camera = False
     light.visible_shadow = False
+    _hide_with(hole, light)
     homes = [each for each in hole.users_collection if each in (scene.collection, *scene.collection.children_recursive)]
     (homes[0] if homes else scene.collection).objects.link(light)
     return light
+
+
+def _hide_with(hole: bpy.types.Object, light: bpy.types.Object) -> None:
+    """Have the light hidden where its hole is, by drivers, which need no add-on."""
+    for name in ("hide_render", "hide_viewport"):
+        driver = light.driver_add(name).driver
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        variable.targets[0].id = hole
+        variable.targets[0].data_path = name
+
+
+def remove_orphans(scene: bpy.types.Scene) -> None:
+    """Remove the light of a hole that was deleted; nothing is looked through where there is no light."""
+    if bpy.data.objects.get(NAME) is not None and frame_setup.find_active_hole(scene) is None:
+        for light in [each for each in scene.objects if MARK in each]:
+            _remove(light)
 
 
 def _material() -> bpy.types.Material:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Output: World, as the rest of the add-on knows it."""
 
+from collections.abc import Callable
+
 import bpy
 
 from ...bake.kinds import WORLD_MAP
@@ -94,6 +96,15 @@ class WorldOutput(Output):
         world_sync.point_at_files(scene)
         world_sync.forget_loaded_map(scene)
         return _warnings(scene, frame)
+
+    def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
+        """Let the scene have its own World."""
+        lensed, scene.world = scene.world, scene.get(lensed_world.BEFORE)
+
+        def undo() -> None:
+            scene.world = lensed
+
+        return undo
 
     # --- files ------------------------------------------------------------------------------------
 
