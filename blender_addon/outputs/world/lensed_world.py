@@ -11,7 +11,7 @@ import bpy
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
-from ...scene import environment
+from ...scene import environment, image_world
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
@@ -64,7 +64,7 @@ def check(scene: bpy.types.Scene) -> None:
     if lensed_world(scene) is not None:
         return
     if scene.umbra.environment_source == "IMAGE":
-        environment.read(scene)
+        environment.chosen_image(scene)
         return
     world = scene.world
     if world is None:
@@ -111,7 +111,7 @@ def place(scene: bpy.types.Scene, rotation: tuple[float, ...], strength: float) 
     """Turn and brighten the image that a lensed World shows, if it was made of one."""
     world = lensed_world(scene)
     if world is not None and world[LENSED] == OF_IMAGE:
-        sockets = _placement(world)
+        sockets = image_world.placement(world)
         sockets["Rotation"].default_value = rotation
         sockets["Strength"].default_value = strength
 
@@ -121,14 +121,8 @@ def placement(scene: bpy.types.Scene) -> dict[str, object]:
     world = lensed_world(scene)
     if world is None or world[LENSED] != OF_IMAGE:
         return {}
-    values = {name: socket.default_value for name, socket in _placement(world).items()}
+    values = {name: socket.default_value for name, socket in image_world.placement(world).items()}
     return {name: value if isinstance(value, float) else tuple(value) for name, value in values.items()}
-
-
-def _placement(world: bpy.types.World) -> dict[str, bpy.types.NodeSocket]:
-    names = {"MAPPING": "Rotation", "BACKGROUND": "Strength"}
-    nodes = [node for node in world.node_tree.nodes if node.type in names]
-    return {names[node.type]: node.inputs[names[node.type]] for node in nodes}
 
 
 def remove(scene: bpy.types.Scene) -> None:
@@ -182,22 +176,8 @@ def _copy_of_world(scene: bpy.types.Scene) -> bpy.types.World:
 
 def _world_of_image(scene: bpy.types.Scene) -> bpy.types.World:
     """A World that shows the image chosen as the sky."""
-    sky = environment.read(scene)
-    made = bpy.data.worlds.new(f"{sky.image.name} (lensed)")
-    if NODES_ARE_OPTIONAL:
-        made.use_nodes = True
-    tree = made.node_tree
-    tree.nodes.clear()
-    kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
-    nodes = [tree.nodes.new(f"ShaderNode{kind}") for kind in kinds]
-    for index, node in enumerate(nodes):
-        node.location = (220.0 * index, 0.0)
-    sources = ("Generated", "Vector", "Color", "Background")
-    targets = ("Vector", "Vector", "Color", "Surface")
-    for one, other, source, target in zip(nodes, nodes[1:], sources, targets, strict=False):
-        tree.links.new(one.outputs[source], other.inputs[target])
-    nodes[2].image = sky.image
-    return made
+    image = environment.chosen_image(scene)
+    return image_world.make(f"{image.name} (lensed)", image)
 
 
 def _insert(world: bpy.types.World) -> bpy.types.Node:

@@ -9,7 +9,7 @@ from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
-from ..shared import sequencer
+from ..shared import sequencer, world_files
 from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
@@ -89,6 +89,7 @@ class WorldOutput(Output):
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let the World read the frame's map."""
         (wanted,) = self.map_requests(scene, frame)
+        world_files.check(scene)
         _check_resolved(wanted, frame)
         world_sync.point_at_files(scene)
         world_sync.forget_loaded_map(scene)
