@@ -242,6 +242,31 @@ def world_left_out(scene: bpy.types.Scene) -> str | None:
     return f"The stars are shown and not the World. {refusal.for_user()}"
 
 
+# On the scene: the stars are its sky because the World, which is more than a color, cannot be shown by an image.
+_LEFT_OUT = "umbra_world_left_out"
+
+
+def leave_world(scene: bpy.types.Scene) -> None:
+    """Choose an image as the sky, of the stars if there is none, in place of a World that no image can show."""
+    settings = scene.umbra
+    scene[_LEFT_OUT] = True
+    settings.environment_image = settings.environment_image or load_star_sky()
+    settings.environment_source = "IMAGE"
+
+
+def take_world(scene: bpy.types.Scene) -> bool:
+    """Choose the World again where only an image could not show it; return whether that was so."""
+    settings = scene.umbra
+    was_left_out = scene.get(_LEFT_OUT) is not None and settings.environment_source == "IMAGE"
+    if _LEFT_OUT in scene:
+        del scene[_LEFT_OUT]
+    image = settings.environment_image
+    if not was_left_out or image is None or image.name != STAR_SKY_NAME:
+        return False
+    settings.environment_source = "WORLD"
+    return True
+
+
 def prepare(scene: bpy.types.Scene) -> None:
     """Render the panorama that a scene's sky needs, if it needs one and it is not there.
 

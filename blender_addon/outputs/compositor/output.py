@@ -42,10 +42,21 @@ class CompositorOutput(Output):
         """Set the compositor up again if it was when the scene left it."""
         if not leaving.give_back(scene):
             return []
-        notes = _prepare(scene) + compositing.set_up(scene)
+        notes: list[str] = []
+        is_left = False
+        if scene.umbra.environment_source == "WORLD":
+            try:
+                environment.read_world(scene, may_render=True)
+            except SceneError as error:
+                is_left = error.code not in environment.NO_SKY
+                if is_left:
+                    notes = _leave_world(scene, error)
+        notes += _prepare(scene) + compositing.set_up(scene)
         setup = find_setup(scene)
         if setup is not None:
             write_to_group(setup.group, look)
+        if is_left:
+            self.brighten_stars(scene)
         return notes
 
     def remove(self, scene: bpy.types.Scene) -> None:
@@ -102,16 +113,17 @@ class CompositorOutput(Output):
         """Choose the star sky where the World has none that can be shown, and set the compositor up."""
         settings = scene.umbra
         stars = False
-        notes = []
+        notes: list[str] = []
         if settings.environment_source == "WORLD":
             try:
                 environment.read_world(scene, may_render=True)
             except SceneError as error:
-                if error.code not in environment.NO_SKY:
-                    notes.append(f"The World is not the sky of the black hole. {error.for_user()}")
                 stars = settings.environment_image is None
-                settings.environment_image = settings.environment_image or environment.load_star_sky()
-                settings.environment_source = "IMAGE"
+                if error.code in environment.NO_SKY:
+                    settings.environment_image = settings.environment_image or environment.load_star_sky()
+                    settings.environment_source = "IMAGE"
+                else:
+                    notes = _leave_world(scene, error)
         notes += compositing.set_up(scene)
         if stars:
             self.brighten_stars(scene)
@@ -222,6 +234,12 @@ class CompositorOutput(Output):
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         """Draw the sky."""
         panel.draw(layout, scene, self.sky_problem(scene))
+
+
+def _leave_world(scene: bpy.types.Scene, error: SceneError) -> list[str]:
+    """Choose an image in place of a World that cannot be the sky, and say why."""
+    environment.leave_world(scene)
+    return [f"The World is not the sky of the black hole. {error.for_user()}"]
 
 
 def _prepare(scene: bpy.types.Scene) -> list[str]:

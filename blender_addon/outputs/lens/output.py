@@ -57,6 +57,7 @@ class LensOutput(Output):
         """Convert the scene's cameras, and put the sky of the settings behind them."""
         for camera in lens_camera.cameras_of(scene):
             lens_camera.convert(camera)
+        environment.take_world(scene)
         lens_sky.install(scene, look)
         return []
 

@@ -7,10 +7,11 @@ from ...bake.kinds import WORLD_MAP
 from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
+from ...scene import environment
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
 from ..shared import sequencer, world_files
-from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
+from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
 
@@ -39,12 +40,20 @@ class WorldOutput(Output):
     def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
         """Give the scene a lensed copy of its World; the artist's own values stay in one that is there."""
         is_new = lensed_world.lensed_world(scene) is None
-        node = lensed_world.install(scene)
+        has_taken = environment.take_world(scene)
+        try:
+            node = lensed_world.install(scene)
+        except SceneError:
+            if has_taken:
+                environment.leave_world(scene)
+            raise
+        if has_taken:  # what the stars were brightened by
+            look = look | {EXPOSURE: 0.0}
         if is_new:
             write_to_group(node, {name: value for name, value in look.items() if name in CARRIED})
             if PLACEMENT["Rotation"] in look:
                 lensed_world.place(scene, look[PLACEMENT["Rotation"]], look.get(PLACEMENT["Strength"], 1.0))
-        return []
+        return lensed_world.unbent(scene)
 
     def remove(self, scene: bpy.types.Scene) -> None:
         """Put the World back that was there."""
@@ -119,6 +128,7 @@ class WorldOutput(Output):
             check_world(scene)
         except SceneError as error:
             found.append(Notice(error.for_user(), "ERROR"))
+        found += [Notice(each) for each in lensed_world.unbent(scene)]
         return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
