@@ -61,7 +61,7 @@ def write_sequence(folder: Path, exr: ModuleType, frames: tuple[int, ...]) -> Pa
     return paths[0]
 
 
-def panorama(tree: bpy.types.NodeTree) -> bpy.types.Node:
+def unlinked_panorama(tree: bpy.types.NodeTree) -> bpy.types.Node:
     """A new Environment Texture that shows the image "Panorama", as yet not linked."""
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = bpy.data.images.new(PANORAMA, 32, 16, float_buffer=True)
@@ -138,7 +138,7 @@ def test_a_world_in_a_node_group_stays_the_sky(scene: bpy.types.Scene, capfd: py
     """Background and Environment Texture in a group, as in the Worlds that asset libraries give out."""
     group = bpy.data.node_groups.new("Sunset", "ShaderNodeTree")
     group.interface.new_socket("Background", in_out="OUTPUT", socket_type="NodeSocketShader")
-    texture = panorama(group)
+    texture = unlinked_panorama(group)
     background = group.nodes.new("ShaderNodeBackground")
     end = group.nodes.new("NodeGroupOutput")
     group.links.new(texture.outputs["Color"], background.inputs["Color"])
@@ -159,7 +159,7 @@ def test_a_world_is_not_put_away_without_a_word(
 ) -> None:
     """A node between image and Background, or the coordinates Normal: the panorama stays, or a warning tells."""
     tree = scene.world.node_tree
-    texture = panorama(tree)
+    texture = unlinked_panorama(tree)
     color = texture.outputs["Color"]
     if between is None:
         coordinates = tree.nodes.new("ShaderNodeTexCoord")
@@ -178,7 +178,7 @@ def test_a_world_is_not_put_away_without_a_word(
 # --- Worlds that are no plain image ---------------------------------------------------------------
 
 # A panorama of this width, in place of 4096, is quick to render.
-WIDTH = 512
+WIDTH = 1024
 # Between its pixels a panorama is interpolated: what a sky as smooth as these ones loses by that, and by half floats.
 TOLERANCE = 4e-3
 TINY = 1e-7  # of a hole that bends nothing
@@ -210,6 +210,8 @@ def by_coordinates(tree: bpy.types.NodeTree, name: str) -> None:
 def procedural(tree: bpy.types.NodeTree, kind: str, output: str = "Color") -> None:
     """A texture that is no image."""
     node = tree.nodes.new(f"ShaderNodeTex{kind}")
+    if kind == "Gradient":
+        node.gradient_type = "RADIAL"
     tree.links.new(node.outputs[output], tree.nodes["Background"].inputs["Color"])
 
 
@@ -217,7 +219,7 @@ def sunless(tree: bpy.types.NodeTree) -> None:
     """A Sky Texture without the disk of the sun, whose edge is too sharp to compare."""
     node = tree.nodes.new("ShaderNodeTexSky")
     node.sun_disc = False
-    tree.nodes["Background"].inputs["Strength"].default_value = 0.02
+    tree.nodes["Background"].inputs["Strength"].default_value = 0.3
     tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
 
 
@@ -327,7 +329,7 @@ def test_output_world_bends_what_is_in_a_group(
         pictures.append(render(scene, tmp_path / f"{output}.exr", exr)[..., :3])
     assert (pictures[0].max(axis=-1) == 0.0).sum() > 20  # the shadow
     differing = np.abs(pictures[1] - pictures[0]).max(axis=-1) > 0.02
-    assert differing.mean() < 0.03  # pixels at the shadow's edge, and what is crowded beside it
+    assert differing.mean() < 0.05  # pixels at the shadow's edge, and what is crowded beside it
 
 
 def test_a_panorama_is_kept_until_the_world_changes(
@@ -351,7 +353,7 @@ def test_a_panorama_is_kept_until_the_world_changes(
     assert changed != image
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
-    assert environment.read(bpy.context.scene).image.name == "World Panorama"
+    assert environment.read(bpy.context.scene).image.name.startswith("World Panorama")
 
 
 @pytest.mark.parametrize("kind", ["animated", "camera", "tiles"])
@@ -441,7 +443,7 @@ def test_a_missing_frame_is_refused_in_every_output(
         scene.frame_set(frame)
         check(scene)
     scene.frame_set(2)
-    with pytest.raises(addon_module("core.errors").SceneError, match="sky_0002.exr is missing") as caught:
+    with pytest.raises(addon_module("core.errors").SceneError, match=r"sky_0002\.exr is missing") as caught:
         check(scene)
     assert caught.value.code == "sky.frame-missing"
 
