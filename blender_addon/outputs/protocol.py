@@ -106,6 +106,9 @@ class Output(ABC):
     def refresh(self, scene: bpy.types.Scene) -> None:
         """Carry changed settings into a scene that is set up. Failures are left to the render and the panel."""
 
+    def prepare(self, scene: bpy.types.Scene) -> None:
+        """Make what the settings need and a render could not make, before `refresh`. May take seconds."""
+
     def refresh_disk(self, scene: bpy.types.Scene) -> None:
         """Carry changed settings of the disk into the scene.
 

@@ -13,7 +13,10 @@ from .shared import disk_light
 def refresh(owner: bpy.types.ID) -> None:
     """Carry the settings of a scene into its output."""
     if isinstance(owner, bpy.types.Scene):
-        registry.of(owner).refresh(owner)
+        output = registry.of(owner)
+        if owner.library is None:
+            output.prepare(owner)
+        output.refresh(owner)
 
 
 def refresh_disk(scene: bpy.types.Scene) -> None:

@@ -2,7 +2,7 @@
 """The sky around the hole: the World's, an image, or the built-in sky of real stars."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,24 @@ from ..core import color_spaces
 from ..core.blender_version import NODES_ARE_OPTIONAL
 from ..core.errors import SceneError
 from ..core.physics_api import PACKAGE, physics
+from ..core.session import SESSION, Life
+from . import panorama, sky_frames, world_digest
+from .node_paths import Place, source, world_output
 
-# On a scene whose World is replaced by a lensed copy: the World itself.
+# On a scene whose World is replaced, by a lensed copy or by one that shows the sky's image: the World itself.
 WORLD_BEFORE = "umbra_world_before"
 
 STAR_SKY_NAME = "Umbra Star Sky"
 STAR_SKY_HEIGHT = 2048
 _STAR_SKY_FILE = f"star_sky_{STAR_SKY_HEIGHT}.exr"
 
+# Codes of Worlds that show no picture of a sky.
+NO_SKY = frozenset({"sky.plain-color", "sky.no-world"})
+
 _HELP = "connect Environment Texture > Background > World Output, or choose Sky: Image in the Umbra panel"
+
+# The engine whose Worlds have an image's alpha multiplied in before its colors are decoded.
+_CYCLES = "CYCLES"
 
 
 @dataclass(frozen=True)
@@ -35,24 +44,13 @@ class Sky:
     rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Euler XYZ, radians, as in a Mapping node of type Point."""
     strength: float = 1.0
-    rotation_path: str | None = None
-    """Data path, from the World, of the value to follow; None where it is fixed."""
-    strength_path: str | None = None
+    rotation_at: Place | None = None
+    """Where the World holds the rotation, to be followed; None where it is fixed."""
+    strength_at: Place | None = None
 
 
-def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
-    """The output that feeds an input, seen through reroutes."""
-    while socket.is_linked:
-        origin = socket.links[0].from_socket
-        if origin.node.type != "REROUTE":
-            return origin
-        socket = origin.node.inputs[0]
-    return None
-
-
-def _input_path(node: bpy.types.Node, name: str) -> str:
-    index = next(number for number, each in enumerate(node.inputs) if each.name == name)
-    return f'node_tree.nodes["{bpy.utils.escape_identifier(node.name)}"].inputs[{index}].default_value'
+class _NoPlainImageError(SceneError):
+    """A World is more than an image with rotation and strength."""
 
 
 def _angles(rotation: Iterable[float]) -> tuple[float, float, float]:
@@ -60,118 +58,228 @@ def _angles(rotation: Iterable[float]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _mapping(texture: bpy.types.Node) -> tuple[tuple[float, float, float], str | None]:
-    """Rotation of the sky before an Environment Texture, and the path to follow it by."""
-    origin = _source(texture.inputs["Vector"])
-    if origin is None:
-        return (0.0, 0.0, 0.0), None
+def _no_plain_image(world: bpy.types.World, node: bpy.types.Node) -> _NoPlainImageError:
+    return _NoPlainImageError(
+        f'World "{world.name}" makes its sky with the node "{node.name}", which is no plain image: {_HELP}.',
+        code="sky.panorama",
+    )
+
+
+def _rotation(world: bpy.types.World, texture: Place) -> tuple[tuple[float, float, float], Place | None]:
+    """Rotation of the sky before an Environment Texture, and where to follow it."""
+    origin = texture.input("Vector")
     mapping = None
-    if origin.node.type == "MAPPING":
-        mapping = origin.node
-        origin = _source(mapping.inputs["Vector"])
-    if origin is None or origin.node.type != "TEX_COORD" or origin.name != "Generated":
-        raise SceneError(
-            "The World's Environment Texture takes its coordinates from something else than Texture "
-            f"Coordinate > Generated, with or without a Mapping node: {_HELP}.",
-            code="sky.coordinates",
-        )
+    if origin.is_output and origin.node.type == "MAPPING":
+        mapping = origin
+        origin = mapping.input("Vector")
+    if origin.is_output and (origin.node.type != "TEX_COORD" or origin.socket.name != "Generated"):
+        raise _no_plain_image(world, origin.node)
     if mapping is None:
+        if origin.node != texture.node:  # a vector that is the same everywhere
+            raise _no_plain_image(world, origin.node)
         return (0.0, 0.0, 0.0), None
-    inputs = mapping.inputs
-    if any(each.is_linked for each in inputs if each.name != "Vector"):
-        raise SceneError(
-            f"The World's Mapping node is driven by other nodes, which cannot be followed: {_HELP}.", code="sky.mapping"
-        )
-    has_location = mapping.vector_type in {"POINT", "TEXTURE"}
-    moves = has_location and any(inputs["Location"].default_value)
-    if moves or tuple(inputs["Scale"].default_value) != (1.0, 1.0, 1.0):
-        raise SceneError(
-            "The World's Mapping node moves or scales the sky: only its Rotation can be taken over; set "
-            "Location to 0 and Scale to 1.",
-            code="sky.mapping",
-        )
-    rotation = Euler(inputs["Rotation"].default_value, "XYZ")
-    if mapping.vector_type == "TEXTURE":
+    node = mapping.node
+    if not origin.is_output:
+        raise _no_plain_image(world, node)
+    values = {name: mapping.input(name) for name in ("Location", "Rotation", "Scale")}
+    has_location = node.vector_type in {"POINT", "TEXTURE"}
+    moves = has_location and (values["Location"].is_output or any(values["Location"].value))
+    if moves or values["Rotation"].is_output or values["Scale"].is_output or tuple(values["Scale"].value) != (1, 1, 1):
+        raise _no_plain_image(world, node)
+    rotation = Euler(values["Rotation"].value, "XYZ")
+    if node.vector_type == "TEXTURE":
         return _angles(rotation.to_matrix().inverted().to_euler("XYZ")), None
-    return _angles(rotation), _input_path(mapping, "Rotation")
+    return _angles(rotation), values["Rotation"]
 
 
-def read_world(scene: bpy.types.Scene) -> Sky:
-    """The sky that a scene's World shows, or the one that its lensed World was made from, as that places it now.
-
-    Raises
-    ------
-    SceneError
-        The World is missing, or is not an Environment Texture feeding a Background.
-    """
-    world = scene.get(WORLD_BEFORE, scene.world)
+def _world_of(scene: bpy.types.Scene) -> bpy.types.World:
+    world: bpy.types.World | None = scene.get(WORLD_BEFORE, scene.world)
     if world is None:
         raise SceneError(
             f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
         )
-    uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
-    if not uses_nodes or world.node_tree is None:
-        raise SceneError(
-            f'World "{world.name}" is a plain color and has no environment: {_HELP}.', code="sky.plain-color"
-        )
-    engine = "CYCLES" if scene.render.engine == "CYCLES" else "EEVEE"
-    output = world.node_tree.get_output_node(engine)
-    surface = _source(output.inputs["Surface"]) if output is not None else None
-    if surface is None or surface.node.type != "BACKGROUND":
+    return world
+
+
+def _output_of(scene: bpy.types.Scene, world: bpy.types.World) -> bpy.types.Node:
+    """The output of a World whose surface is made by nodes."""
+    if world.node_tree is None or (NODES_ARE_OPTIONAL and not world.use_nodes):
+        raise _plain_color(world)
+    output: bpy.types.Node | None = world_output(scene, world)
+    if output is None or not output.inputs["Surface"].is_linked:
         raise SceneError(
             f'World "{world.name}" is not a Background, so its sky cannot be taken over: {_HELP}.',
             code="sky.no-background",
         )
-    background = surface.node
-    color = _source(background.inputs["Color"])
-    if color is None:
-        raise SceneError(
-            f'World "{world.name}" is a plain color and has no environment: {_HELP}.', code="sky.plain-color"
-        )
-    if color.node.type != "TEX_ENVIRONMENT":
-        raise SceneError(
-            f'World "{world.name}" makes its color with the node "{color.node.name}", which cannot be '
-            f"taken over: {_HELP}.",
-            code="sky.color-node",
-        )
-    if background.inputs["Strength"].is_linked:
-        raise SceneError(
-            f'The strength of World "{world.name}" is driven by other nodes, which cannot be followed: set '
-            "it as a number.",
-            code="sky.strength",
-        )
-    texture = color.node
-    if texture.image is None:
+    return output
+
+
+def _plain_color(world: bpy.types.World) -> SceneError:
+    return SceneError(f'World "{world.name}" is a plain color and has no environment: {_HELP}.', code="sky.plain-color")
+
+
+def _plain_image(world: bpy.types.World, output: bpy.types.Node) -> Sky:
+    """The sky of a World that is an image with rotation and strength."""
+    background = source(Place(output.inputs["Surface"]))
+    if not background.is_output or background.node.type != "BACKGROUND":
+        raise _no_plain_image(world, background.node)
+    texture, strength = background.input("Color"), background.input("Strength")
+    if not texture.is_output:
+        raise _plain_color(world)
+    if texture.node.type != "TEX_ENVIRONMENT" or texture.node.projection != "EQUIRECTANGULAR":
+        raise _no_plain_image(world, texture.node)
+    image = texture.node.image
+    if image is None:
         raise SceneError(
             f'The Environment Texture of World "{world.name}" has no image: choose one.', code="sky.no-image"
         )
-    if texture.projection != "EQUIRECTANGULAR":
-        raise SceneError(
-            f'The Environment Texture of World "{world.name}" is a mirror ball: only Equirectangular images '
-            "can be taken over.",
-            code="sky.mirror-ball",
-        )
-    rotation, rotation_path = _mapping(texture)
-    strength, strength_path = background.inputs["Strength"].default_value, _input_path(background, "Strength")
-    if scene.world is not None and scene.world != world:
-        rotation = _value_at(scene.world, rotation_path, rotation)
-        strength = _value_at(scene.world, strength_path, strength)
-    return Sky(
-        image=texture.image,
-        texture=texture,
-        rotation=_angles(rotation),
-        strength=strength,
-        rotation_path=rotation_path,
-        strength_path=strength_path,
+    if image.source == "TILED":
+        raise sky_frames.tiled(image)
+    if strength.is_output:
+        raise _no_plain_image(world, strength.node)
+    rotation, rotation_at = _rotation(world, texture)
+    return Sky(image, texture.node, rotation, strength.value, rotation_at, strength)
+
+
+def _image_as_shown(scene: bpy.types.Scene, image: bpy.types.Image, *, may_render: bool) -> bpy.types.Image:
+    """The image as a World shows it: Cycles multiplies the alpha of 8-bit images into colors as they are encoded."""
+    if scene.render.engine != _CYCLES or not _alpha_counts(image):
+        return image
+    if may_render:
+        return panorama.of_image(image)
+    return panorama.find(world_digest.of_image(image)) or _missing_panorama(f'the sky image "{image.name}"')
+
+
+def _missing_panorama(what: str) -> bpy.types.Image:
+    raise SceneError(
+        f"There is no panorama of {what} as it is now, and a render cannot make one: press Update Compositor in the "
+        "Umbra panel.",
+        code="sky.panorama",
     )
 
 
-def _value_at(world: bpy.types.World, path: str | None, otherwise: Any) -> Any:
-    """What a copy of a World has at a path of the World."""
+# Images by name, file and mode -> whether any alpha is less than 1.
+_transparent = SESSION.value(dict[tuple[object, ...], bool], Life.FILE)
+
+
+def _alpha_counts(image: bpy.types.Image) -> bool:
+    if image.source not in {"FILE", "GENERATED"} or image.alpha_mode not in {"STRAIGHT", "PREMUL"}:
+        return False
+    width, height = image.size
+    if image.is_float or image.channels != 4 or width * height == 0:
+        return False
+    key = (image.session_uid, image.filepath, width, height, image.is_dirty)
+    if key not in _transparent.now:
+        values = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(values)
+        _transparent.now[key] = bool(values[3::4].min() < 1.0)
+    return _transparent.now[key]
+
+
+def read_world(scene: bpy.types.Scene, *, may_render: bool = False) -> Sky:
+    """The sky that a scene's World shows, or the one that its lensed World was made from, as that places it now.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    may_render : bool
+        Whether a panorama of a World that is no plain image is rendered where there is none. Not inside a render.
+
+    Raises
+    ------
+    SceneError
+        The World is missing, is a plain color, or cannot be shown by an image.
+    """
+    world = _world_of(scene)
+    output = _output_of(scene, world)
     try:
-        return otherwise if path is None else world.path_resolve(path)
+        sky = _plain_image(world, output)
+    except _NoPlainImageError:
+        refusal = panorama.problem(world, output)
+        if refusal is not None:
+            raise refusal from None
+        if may_render:
+            return Sky(panorama.of_world(world, output))
+        image = panorama.find(world_digest.of_world(output))
+        return Sky(image or _missing_panorama(f'World "{world.name}"'))
+    image = _image_as_shown(scene, sky.image, may_render=may_render)
+    rotation, strength = sky.rotation, sky.strength
+    if scene.world is not None and scene.world != world:
+        rotation = _value_at(scene.world, world, sky.rotation_at, rotation)
+        strength = _value_at(scene.world, world, sky.strength_at, strength)
+    return replace(sky, image=image, rotation=_angles(rotation), strength=strength)
+
+
+def _value_at(copy: bpy.types.World, world: bpy.types.World, place: Place | None, otherwise: Any) -> Any:
+    """What a copy of a World has at a place of the World."""
+    if place is None or place.owner != world.node_tree:
+        return otherwise
+    try:
+        return copy.node_tree.path_resolve(place.path)
     except ValueError:  # the artist has taken the node out
         return otherwise
+
+
+def world_left_out(scene: bpy.types.Scene) -> str | None:
+    """Return why a World that is more than a color is not the sky, where the stars are shown instead of it."""
+    settings = scene.umbra
+    image = settings.environment_image
+    if settings.environment_source != "IMAGE" or image is None or image.name != STAR_SKY_NAME:
+        return None
+    try:
+        world = _world_of(scene)
+        output = _output_of(scene, world)
+        _plain_image(world, output)
+    except _NoPlainImageError:
+        refusal = panorama.problem(world, output)
+    except SceneError as error:
+        refusal = error
+    else:
+        return None
+    if refusal is None or refusal.code in NO_SKY:
+        return None
+    return f"The stars are shown and not the World. {refusal.for_user()}"
+
+
+# On the scene: the stars are its sky because the World, which is more than a color, cannot be shown by an image.
+_LEFT_OUT = "umbra_world_left_out"
+
+
+def leave_world(scene: bpy.types.Scene) -> None:
+    """Choose an image as the sky, of the stars if there is none, in place of a World that no image can show."""
+    settings = scene.umbra
+    scene[_LEFT_OUT] = True
+    settings.environment_image = settings.environment_image or load_star_sky()
+    settings.environment_source = "IMAGE"
+
+
+def take_world(scene: bpy.types.Scene) -> bool:
+    """Choose the World again where only an image could not show it; return whether that was so."""
+    settings = scene.umbra
+    was_left_out = scene.get(_LEFT_OUT) is not None and settings.environment_source == "IMAGE"
+    if _LEFT_OUT in scene:
+        del scene[_LEFT_OUT]
+    image = settings.environment_image
+    if not was_left_out or image is None or image.name != STAR_SKY_NAME:
+        return False
+    settings.environment_source = "WORLD"
+    return True
+
+
+def prepare(scene: bpy.types.Scene) -> None:
+    """Render the panorama that a scene's sky needs, if it needs one and it is not there.
+
+    Raises
+    ------
+    SceneError
+        There is no sky, or it cannot be read.
+    """
+    settings = scene.umbra
+    if settings.environment_source == "WORLD":
+        read_world(scene, may_render=True)
+    elif settings.environment_image is not None and settings.environment_image.source != "TILED":
+        _image_as_shown(scene, settings.environment_image, may_render=True)
 
 
 def read(scene: bpy.types.Scene) -> Sky:
@@ -185,11 +293,25 @@ def read(scene: bpy.types.Scene) -> Sky:
     settings = scene.umbra
     if settings.environment_source == "WORLD":
         return read_world(scene)
-    if settings.environment_image is None:
+    return Sky(_image_as_shown(scene, chosen_image(scene), may_render=False))
+
+
+def chosen_image(scene: bpy.types.Scene) -> bpy.types.Image:
+    """The image chosen as the sky.
+
+    Raises
+    ------
+    SceneError
+        There is none, or it has several tiles.
+    """
+    image = scene.umbra.environment_image
+    if image is None:
         raise SceneError(
             "There is no environment: choose a sky image in the Umbra panel, or Sky: World.", code="sky.no-image"
         )
-    return Sky(image=settings.environment_image)
+    if image.source == "TILED":
+        raise sky_frames.tiled(image)
+    return image
 
 
 def check_image(image: bpy.types.Image) -> None:
@@ -200,14 +322,11 @@ def check_image(image: bpy.types.Image) -> None:
     SceneError
         It has no pixels.
     """
-    if image.source == "GENERATED" or image.packed_file is not None:
+    if sky_frames.is_packed(image) or image.source != "FILE" or min(image.size) > 0:
         return
-    if image.source == "FILE" and min(image.size) <= 0:
-        path = bpy.path.abspath(image.filepath, library=image.library)
-        raise SceneError(
-            f'The sky image "{image.name}" cannot be loaded from {path}: choose a file that exists.',
-            code="sky.image-missing",
-        )
+    # an OpenEXR file of several layers is no image, but a render result: it has no size of its own
+    if image.type != "MULTILAYER" or not sky_frames.path_of(image).is_file():
+        raise sky_frames.image_missing(image)
 
 
 # --- the built-in sky -----------------------------------------------------------------------------

@@ -58,7 +58,11 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
 
         settings = scene.umbra
         settings.active_hole = hole
+        was_world = settings.environment_source == "WORLD"
         report_notes(self, registry.of(scene).on_hole_added(scene))
+        image = settings.environment_image
+        if was_world and settings.environment_source == "IMAGE" and image is not None:
+            self.report({"INFO"}, f'The sky is the image "{image.name}"; Sky in the Umbra panel chooses another.')
         if len(frame_setup.holes(scene)) > 1:
             self.report({"WARNING"}, only_one_is_rendered(scene))
         if scene.camera is None:

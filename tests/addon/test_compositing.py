@@ -242,7 +242,7 @@ def test_a_texture_mapping_node_is_the_inverse_rotation(scene: bpy.types.Scene, 
     nodes["mapping"].inputs["Rotation"].default_value = (0.0, 0.0, 0.7)
     sky = environment.read_world(scene)
     assert sky.rotation == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
-    assert sky.rotation_path is None
+    assert sky.rotation_at is None
 
 
 def test_worlds_that_cannot_be_taken_over_say_why(
@@ -260,13 +260,13 @@ def test_worlds_that_cannot_be_taken_over_say_why(
     links = scene.world.node_tree.links
 
     nodes["mapping"].inputs["Scale"].default_value = (1.0, 1.0, 2.0)
-    refused("moves or scales")
+    refused("no panorama")
     nodes["mapping"].inputs["Scale"].default_value = (1.0, 1.0, 1.0)
     links.new(nodes["coordinates"].outputs["Camera"], nodes["mapping"].inputs["Vector"])
     refused("Generated")
     links.new(nodes["coordinates"].outputs["Generated"], nodes["mapping"].inputs["Vector"])
     nodes["texture"].projection = "MIRROR_BALL"
-    refused("mirror ball")
+    refused("no panorama")
     nodes["texture"].projection = "EQUIRECTANGULAR"
     nodes["texture"].image = None
     refused("no image")
@@ -274,7 +274,9 @@ def test_worlds_that_cannot_be_taken_over_say_why(
     gamma = scene.world.node_tree.nodes.new("ShaderNodeGamma")
     links.new(nodes["texture"].outputs["Color"], gamma.inputs["Color"])
     links.new(gamma.outputs["Color"], nodes["background"].inputs["Color"])
-    refused('"Gamma", which cannot be taken over')
+    refused("no panorama")
+    gamma.inputs["Gamma"].keyframe_insert("default_value")
+    refused("is animated")
     scene.world = None
     refused("no World")
     scene.umbra.environment_source = "IMAGE"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carry a scene's settings into its compositor set-up: which maps are read, and which sky."""
 
+from typing import Any
+
 import bpy
 
 from ...bake.folder import folder
@@ -8,7 +10,8 @@ from ...bake.kinds import WARP_MAP
 from ...bake.names import sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
-from ...scene import environment, frame_setup
+from ...scene import environment, frame_setup, sky_frames
+from ...scene.node_paths import Place
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
 from ..shared.map_images import NO_MAP, plain_map, read_sequence
@@ -110,6 +113,8 @@ def takes_sky_from_settings(setup: Setup) -> bool:
     socket = setup.group.inputs.get("Environment")
     if socket is None or setup.sky is None:
         return False
+    if not socket.is_linked and setup.sky.image is not None and setup.sky.image.type == "MULTILAYER":
+        return True  # Blender 4.5 drops the links of a file of layers while that is missing
     return any(link.from_node == setup.sky for link in socket.links)
 
 
@@ -128,28 +133,55 @@ def sync_sky(scene: bpy.types.Scene) -> None:
     if setup is None or setup.sky is None or not takes_sky_from_settings(setup):
         return
     sky = environment.read(scene)
-    if setup.sky.image != sky.image:
-        setup.sky.image = sky.image
-    if sky.texture is not None and sky.image.source in {"SEQUENCE", "MOVIE"}:
-        user = sky.texture.image_user
-        for name in ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh"):
-            setattr(setup.sky, name, getattr(user, name))
+    node: Any = setup.sky
+    is_new = node.image != sky.image
+    if is_new:
+        node.image = sky.image
+    _link_picture(setup, node)
+    if sky_frames.moves(sky.image):
+        if sky.texture is not None:
+            sky_frames.copy_settings(sky.texture.image_user, node)
+        elif is_new or node.frame_duration <= 1:  # else they are the artist's own
+            sky_frames.set_defaults(sky.image, node)
     environment.check_image(sky.image)
     from_world = scene.umbra.environment_source == "WORLD"
-    _follow(scene, setup, ROTATION_SOCKET, sky.rotation_path, sky.rotation, fixed=from_world)
-    _follow(scene, setup, STRENGTH_SOCKET, sky.strength_path, sky.strength, fixed=from_world)
+    _follow(scene, setup, ROTATION_SOCKET, sky.rotation_at, sky.rotation, fixed=from_world)
+    _follow(scene, setup, STRENGTH_SOCKET, sky.strength_at, sky.strength, fixed=from_world)
+
+
+def _link_picture(setup: Setup, node: bpy.types.Node) -> None:
+    """Let the group take the picture of the sky's node: of a file of layers that is another output."""
+    pictures = [each for each in node.outputs if each.enabled and each.type == "RGBA"]
+    combined = [each for each in pictures if each.name == "Combined"]
+    picture = next(iter(combined or pictures), None)
+    socket = setup.group.inputs["Environment"]
+    if picture is not None and not any(link.from_socket == picture for link in socket.links):
+        setup.tree.links.new(picture, socket)
+
+
+def check_frame(scene: bpy.types.Scene) -> None:
+    """Refuse a frame whose sky has no file.
+
+    Raises
+    ------
+    SceneError
+        The file is missing.
+    """
+    setup = find_setup(scene)
+    if setup is not None and setup.sky is not None and setup.sky.image is not None and takes_sky_from_settings(setup):
+        sky_frames.check_frame(setup.sky.image, scene.frame_current, setup.sky)
 
 
 def _follow(
     scene: bpy.types.Scene,
     setup: Setup,
     socket_name: str,
-    path: str | None,
+    place: Place | None,
     value: "float | tuple[float, float, float]",
     *,
     fixed: bool,
 ) -> None:
-    """Drive a socket of the group by a World's value; without a path, write a `fixed` value once."""
+    """Drive a socket of the group by a World's value; without a place of that, write a `fixed` value once."""
     socket = setup.group.inputs.get(socket_name)
     if socket is None:
         return
@@ -158,15 +190,16 @@ def _follow(
     animation = setup.tree.animation_data
     drivers = animation.drivers if animation is not None else ()
     present = [each for each in drivers if each.data_path == socket_path]
-    if path is None:
+    if place is None:
         _remove(setup.tree, present)
         if fixed:
             socket.default_value = value
         elif present:  # the World's values are not those of a picture chosen by hand
             socket.default_value = (0.0, 0.0, 0.0) if is_vector else 1.0
         return
+    owner, path = _target(scene, place)
     wanted = [f"{path}[{index}]" for index in range(3)] if is_vector else [path]
-    if [_driven_by(each, scene.world) for each in sorted(present, key=lambda each: each.array_index)] == wanted:
+    if [_driven_by(each, owner) for each in sorted(present, key=lambda each: each.array_index)] == wanted:
         return
     _remove(setup.tree, present)
     for index, data_path in enumerate(wanted):
@@ -174,10 +207,18 @@ def _follow(
         driver.type = "SUM"
         variable = driver.variables.new()
         target = variable.targets[0]
-        target.id_type = "WORLD"
-        target.id = scene.world
+        target.id_type = "NODETREE" if isinstance(owner, bpy.types.NodeTree) else "WORLD"
+        target.id = owner
         target.data_path = data_path
     socket.default_value = value
+
+
+def _target(scene: bpy.types.Scene, place: Place) -> tuple[bpy.types.ID, str]:
+    """Whose value a driver reads, and its path: a World's own nodes are not a datablock by themselves."""
+    world = scene.world
+    if world is not None and place.owner == world.node_tree:
+        return world, f"node_tree.{place.path}"
+    return place.owner, place.path
 
 
 def _remove(tree: bpy.types.NodeTree, drivers: list[bpy.types.FCurve]) -> None:
@@ -186,8 +227,8 @@ def _remove(tree: bpy.types.NodeTree, drivers: list[bpy.types.FCurve]) -> None:
             tree.animation_data.drivers.remove(each)
 
 
-def _driven_by(curve: bpy.types.FCurve, world: bpy.types.World | None) -> str | None:
+def _driven_by(curve: bpy.types.FCurve, owner: bpy.types.ID) -> str | None:
     variables = curve.driver.variables
-    if len(variables) != 1 or variables[0].targets[0].id != world or not curve.driver.is_valid:
+    if len(variables) != 1 or variables[0].targets[0].id != owner or not curve.driver.is_valid:
         return None
     return variables[0].targets[0].data_path

@@ -44,10 +44,21 @@ class CompositorOutput(Output):
         """Set the compositor up again if it was when the scene left it."""
         if not leaving.give_back(scene):
             return []
-        notes = compositing.set_up(scene)
+        notes: list[str] = []
+        is_left = False
+        if scene.umbra.environment_source == "WORLD":
+            try:
+                environment.read_world(scene, may_render=True)
+            except SceneError as error:
+                is_left = error.code not in environment.NO_SKY
+                if is_left:
+                    notes = _leave_world(scene, error)
+        notes += _prepare(scene) + compositing.set_up(scene)
         setup = find_setup(scene)
         if setup is not None:
             write_to_group(setup.group, look)
+        if is_left:
+            self.brighten_stars(scene)
         return notes
 
     def remove(self, scene: bpy.types.Scene) -> None:
@@ -84,7 +95,7 @@ class CompositorOutput(Output):
             raise SceneError(
                 "This scene's output is another one: choose Output: Compositor first.", code="compositor.other-output"
             )
-        return compositing.set_up(scene)
+        return _prepare(scene) + compositing.set_up(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
         """Return whether anything of the set-up is in the compositor."""
@@ -101,17 +112,21 @@ class CompositorOutput(Output):
         compositing.remove(scene)
 
     def on_hole_added(self, scene: bpy.types.Scene) -> list[str]:
-        """Choose the star sky where the World has none, and set the compositor up."""
+        """Choose the star sky where the World has none that can be shown, and set the compositor up."""
         settings = scene.umbra
         stars = False
+        notes: list[str] = []
         if settings.environment_source == "WORLD":
             try:
-                environment.read_world(scene)
-            except SceneError:
+                environment.read_world(scene, may_render=True)
+            except SceneError as error:
                 stars = settings.environment_image is None
-                settings.environment_image = settings.environment_image or environment.load_star_sky()
-                settings.environment_source = "IMAGE"
-        notes = compositing.set_up(scene)
+                if error.code in environment.NO_SKY:
+                    settings.environment_image = settings.environment_image or environment.load_star_sky()
+                    settings.environment_source = "IMAGE"
+                else:
+                    notes = _leave_world(scene, error)
+        notes += compositing.set_up(scene)
         if stars:
             self.brighten_stars(scene)
         return notes
@@ -129,6 +144,12 @@ class CompositorOutput(Output):
         if setup is not None and setup.tree.library is None:
             compositor_sync.repair(scene)
             compositor_sync.refresh(scene)
+
+    def prepare(self, scene: bpy.types.Scene) -> None:
+        """Render the panorama of a World that is no plain image."""
+        if find_setup(scene) is not None:
+            for note in _prepare(scene):
+                messages.warn(note)
 
     # --- rendering --------------------------------------------------------------------------------
 
@@ -165,6 +186,7 @@ class CompositorOutput(Output):
         """Let the group read the frame's map."""
         (wanted,) = self.map_requests(scene, frame)
         warnings = _unresolved(wanted, frame)
+        compositor_sync.check_frame(scene)
         disk_sync.check_shot(scene, frame.parameters)
         compositor_sync.point_at_maps(scene)
         return warnings
@@ -212,7 +234,8 @@ class CompositorOutput(Output):
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
         """Say where the compositor is not set up."""
         if find_setup(scene) is not None:
-            return []
+            left_out = environment.world_left_out(scene)
+            return [] if left_out is None else [Notice(left_out)]
         return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
@@ -229,6 +252,21 @@ class CompositorOutput(Output):
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         """Draw the sky."""
         panel.draw(layout, scene, self.sky_problem(scene))
+
+
+def _leave_world(scene: bpy.types.Scene, error: SceneError) -> list[str]:
+    """Choose an image in place of a World that cannot be the sky, and say why."""
+    environment.leave_world(scene)
+    return [f"The World is not the sky of the black hole. {error.for_user()}"]
+
+
+def _prepare(scene: bpy.types.Scene) -> list[str]:
+    """Render the panorama that the sky needs; why there is none. What else is wrong with the sky is found later on."""
+    try:
+        environment.prepare(scene)
+    except SceneError as error:
+        return [error.for_user()] if error.code == "sky.panorama-failed" else []
+    return []
 
 
 def _unresolved(wanted: MapRequest, frame: FrameSetup) -> list[str]:

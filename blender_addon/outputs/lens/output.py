@@ -10,21 +10,24 @@ from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
-from ...scene import frame_setup
+from ...scene import environment, frame_setup
 from ...scene.camera_type import is_converted
 from ...scene.frame_setup import FrameSetup
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
-from ..shared import disk_sync, leaving, sequencer
+from ..shared import disk_sync, leaving, sequencer, world_files
 from ..shared.compositor_tree import check_unmuted, find_tree
 from ..shared.look import look_of_scene
 from ..shared.tree_editing import check_shared
-from . import foreground, lens_camera, lens_disk, lens_objects, lens_shader, lens_sync, lens_tree, panel
+from . import foreground, lens_camera, lens_disk, lens_objects, lens_shader, lens_sky, lens_sync, lens_tree, panel
 from .carrier import LensCarrier
 
 # The device of a scene that is rendered on the CPU in place of a GPU, to be set back.
 _devices = SESSION.per_scene(str, Life.FILE)
 
+ANOTHER_SKY = (
+    'World "{}" was chosen since, and is shown in place of the sky image; Sky: World and Image brings that back.'
+)
 NO_MAPS = "The lens traces its rays itself (Rays: No Bake): there is no map to check."
 
 
@@ -46,15 +49,19 @@ class LensOutput(Output):
         tree = find_tree(scene)
         if tree is not None and disk_sync.wanted_hole(scene) is not None:
             check_shared(scene, tree)
+        if scene.umbra.environment_source == "IMAGE" and scene.umbra.environment_image is not None:
+            environment.chosen_image(scene)
         frame_setup.active_camera(scene)
         for camera in lens_camera.cameras_of(scene):
             lens_camera.check(camera)
         lens_shader.bytecode(uses_map=False)
 
     def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
-        """Convert the scene's cameras."""
+        """Convert the scene's cameras, and put the sky of the settings behind them."""
         for camera in lens_camera.cameras_of(scene):
             lens_camera.convert(camera)
+        environment.take_world(scene)
+        lens_sky.install(scene, look)
         return []
 
     def remove(self, scene: bpy.types.Scene) -> None:
@@ -63,10 +70,11 @@ class LensOutput(Output):
         foreground.remove(scene)
         for camera in lens_camera.cameras_of(scene):
             lens_camera.restore(camera)
+        lens_sky.remove(scene)
 
     def look(self, scene: bpy.types.Scene) -> Look:
-        """Return the scene's own settings."""
-        return look_of_scene(scene)
+        """Return the scene's own settings, and those of the sky's image."""
+        return look_of_scene(scene) | lens_sky.look(scene)
 
     def marks(self, scene: bpy.types.Scene) -> bool:
         """Return whether the compositor was left, and not for another output."""
@@ -76,6 +84,7 @@ class LensOutput(Output):
         """Let the viewport see the scene as it stands, and the disk read the passes of the settings."""
         lens_sync.show_live(scene)
         try:
+            lens_sky.refresh(scene)
             lens_disk.refresh(scene)
         except SceneError as error:
             messages.warn(error.for_user())
@@ -132,6 +141,7 @@ class LensOutput(Output):
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Give the camera the frame's parameters and its map."""
+        world_files.check(scene)
         if lens_disk.is_in_use(scene):
             disk_sync.check_shot(scene, frame.parameters)
             lens_disk.point_at_passes(scene)
@@ -144,7 +154,10 @@ class LensOutput(Output):
         return warnings
 
     def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
-        """Let the cameras be what they were, and the picture go past the disk."""
+        """Let the cameras and the World be what they were, and no disk be drawn."""
+        shown = scene.world
+        if lens_sky.world_of_image(scene) is not None:
+            scene.world = scene.get(environment.WORLD_BEFORE)
         cameras = [each for each in lens_camera.cameras_of(scene) if is_converted(each)]
         for camera in cameras:
             lens_camera.restore(camera)
@@ -154,6 +167,7 @@ class LensOutput(Output):
             for camera in cameras:
                 lens_camera.convert(camera)
             link_back()
+            scene.world = shown
 
         return undo
 
@@ -194,6 +208,9 @@ class LensOutput(Output):
         problem = lens_shader.device_problem(scene)
         if problem is not None:
             found.append(Notice(problem.for_user(), "INFO" if scene.umbra.cpu_fallback else "ERROR"))
+        hidden_by = lens_sky.hidden_by(scene)
+        if hidden_by is not None:
+            found.append(Notice(ANOTHER_SKY.format(hidden_by.name)))
         found += [Notice(each) for each in lens_objects.warnings(scene, depsgraph, frame)]
         if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
             found.append(Notice("The viewport shows the lens without the camera's speed; a render has it."))
@@ -202,6 +219,10 @@ class LensOutput(Output):
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         """Draw the lens's settings."""
         panel.draw(layout, scene)
+
+    def brighten_stars(self, scene: bpy.types.Scene) -> None:
+        """Brighten the star sky, unless the artist has set an exposure."""
+        lens_sky.brighten_stars(scene)
 
 
 def _exit_map(scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:

@@ -3,12 +3,18 @@
 
 import bpy
 
+from ..shared.drawing import draw_sky_choice
+from . import lens_sky
+
 
 def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the settings, and the buttons of the foreground."""
     settings = scene.umbra
     layout.prop(settings, "lens_rays")
     layout.prop(settings, "sphere_radius")
+    draw_sky_choice(layout, settings)
+    for name, socket in lens_sky.controls(scene).items():
+        layout.prop(socket, "default_value", text=name)
     layout.prop(settings, "redshift_color")
     layout.prop(settings, "redshift_brightness")
     layout.prop(settings, "sky_temperature")

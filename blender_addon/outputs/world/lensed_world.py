@@ -6,12 +6,15 @@ nodes: the group's Vector takes the place of Generated coordinates, and each Bac
 Tint and Fault.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import bpy
 
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
-from ...scene import environment
+from ...scene import environment, image_world
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
@@ -30,7 +33,19 @@ _NO_BACKGROUND = (
 )
 
 # Kinds of nodes that look in the ray's direction when their input Vector is not linked.
-_LOOK_BY_THEMSELVES = ("TEX_ENVIRONMENT", "TEX_SKY")
+_LOOK_BY_THEMSELVES = frozenset(
+    (
+        *("TEX_ENVIRONMENT", "TEX_SKY", "TEX_NOISE", "TEX_VORONOI", "TEX_GRADIENT", "TEX_MAGIC", "TEX_WAVE"),
+        *("TEX_CHECKER", "TEX_BRICK", "TEX_GABOR"),
+    )
+)
+
+# Outputs, by the node's kind, that give the ray's direction, and those that give the opposite one.
+_ALONG = {"TEX_COORD": {"Generated", "Object"}, "NEW_GEOMETRY": {"Position"}}
+_AGAINST = {"TEX_COORD": {"Normal", "Reflection"}, "NEW_GEOMETRY": {"Normal", "True Normal", "Incoming"}}
+
+# On the copy of a group inside of the World: that it is one.
+_COPY = "umbra_lensed_group"
 
 
 def lensed_world(scene: bpy.types.Scene) -> bpy.types.World | None:
@@ -64,7 +79,7 @@ def check(scene: bpy.types.Scene) -> None:
     if lensed_world(scene) is not None:
         return
     if scene.umbra.environment_source == "IMAGE":
-        environment.read(scene)
+        environment.chosen_image(scene)
         return
     world = scene.world
     if world is None:
@@ -72,7 +87,7 @@ def check(scene: bpy.types.Scene) -> None:
             f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
         )
     uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
-    if uses_nodes and not any(node.type == "BACKGROUND" for node in world.node_tree.nodes):
+    if uses_nodes and not any(node.type == "BACKGROUND" for node in _all_nodes(world.node_tree)):
         raise SceneError(_NO_BACKGROUND.format(world.name), code="sky.no-background")
 
 
@@ -111,7 +126,7 @@ def place(scene: bpy.types.Scene, rotation: tuple[float, ...], strength: float) 
     """Turn and brighten the image that a lensed World shows, if it was made of one."""
     world = lensed_world(scene)
     if world is not None and world[LENSED] == OF_IMAGE:
-        sockets = _placement(world)
+        sockets = image_world.placement(world)
         sockets["Rotation"].default_value = rotation
         sockets["Strength"].default_value = strength
 
@@ -121,14 +136,8 @@ def placement(scene: bpy.types.Scene) -> dict[str, object]:
     world = lensed_world(scene)
     if world is None or world[LENSED] != OF_IMAGE:
         return {}
-    values = {name: socket.default_value for name, socket in _placement(world).items()}
+    values = {name: socket.default_value for name, socket in image_world.placement(world).items()}
     return {name: value if isinstance(value, float) else tuple(value) for name, value in values.items()}
-
-
-def _placement(world: bpy.types.World) -> dict[str, bpy.types.NodeSocket]:
-    names = {"MAPPING": "Rotation", "BACKGROUND": "Strength"}
-    nodes = [node for node in world.node_tree.nodes if node.type in names]
-    return {names[node.type]: node.inputs[names[node.type]] for node in nodes}
 
 
 def remove(scene: bpy.types.Scene) -> None:
@@ -152,7 +161,11 @@ def _delete(world: bpy.types.World) -> None:
     node = group_node(world)
     group = None if node is None else node.node_tree
     images = {image for image in map(world.get, (FILE_IMAGE, *LIVE_IMAGES)) if image is not None}
+    copies = [each for each in _inner_trees(world.node_tree) if _COPY in each]
     bpy.data.worlds.remove(world)
+    for each in copies:  # outer ones come first
+        if each.users == 0:
+            bpy.data.node_groups.remove(each)
     if group is None or group.users > 0:
         return
     images.update(each.image for each in world_nodes.map_nodes(group) if each.image is not None)
@@ -182,48 +195,102 @@ def _copy_of_world(scene: bpy.types.Scene) -> bpy.types.World:
 
 def _world_of_image(scene: bpy.types.Scene) -> bpy.types.World:
     """A World that shows the image chosen as the sky."""
-    sky = environment.read(scene)
-    made = bpy.data.worlds.new(f"{sky.image.name} (lensed)")
-    if NODES_ARE_OPTIONAL:
-        made.use_nodes = True
-    tree = made.node_tree
-    tree.nodes.clear()
-    kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
-    nodes = [tree.nodes.new(f"ShaderNode{kind}") for kind in kinds]
-    for index, node in enumerate(nodes):
-        node.location = (220.0 * index, 0.0)
-    sources = ("Generated", "Vector", "Color", "Background")
-    targets = ("Vector", "Vector", "Color", "Surface")
-    for one, other, source, target in zip(nodes, nodes[1:], sources, targets, strict=False):
-        tree.links.new(one.outputs[source], other.inputs[target])
-    nodes[2].image = sky.image
-    return made
+    image = environment.chosen_image(scene)
+    return image_world.make(f"{image.name} (lensed)", image)
+
+
+def _inner_trees(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
+    """The groups in a tree, those in groups after the ones that they are in."""
+    found: list[bpy.types.NodeTree] = []
+    waiting = [tree]
+    while waiting:
+        for node in waiting.pop(0).nodes:
+            inner = node.node_tree if node.type == "GROUP" else None
+            if inner is not None and inner not in found and not world_group.is_group(inner):
+                found.append(inner)
+                waiting.append(inner)
+    return found
+
+
+def _all_nodes(tree: bpy.types.NodeTree) -> list[Any]:
+    return [node for each in (tree, *_inner_trees(tree)) for node in each.nodes]
+
+
+@dataclass(frozen=True)
+class _Sources:
+    """The group's results, as sockets in one tree."""
+
+    vector: bpy.types.NodeSocket
+    tint: bpy.types.NodeSocket
+    fault: bpy.types.NodeSocket
 
 
 def _insert(world: bpy.types.World) -> bpy.types.Node:
     """Put the group into a World's nodes."""
     tree = world.node_tree
-    backgrounds = [node for node in tree.nodes if node.type == "BACKGROUND"]
-    if not backgrounds:
+    if not any(node.type == "BACKGROUND" for node in _all_nodes(tree)):
         raise SceneError(_NO_BACKGROUND.format(world.name.removesuffix(" (lensed)")), code="sky.no-background")
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = world_group.new_group()
     node.name = node.label = world_group.GROUP_NAME
     node.width = 220.0
     node.location = (min(each.location.x for each in tree.nodes) - 320.0, 0.0)
-    vector = node.outputs[world_group.VECTOR.name]
-    for link in [each for each in tree.links if each.from_node.type == "TEX_COORD"]:
-        if link.from_socket.name == "Generated":
-            tree.links.new(vector, link.to_socket)
-    for each in tree.nodes:
-        if each.type in _LOOK_BY_THEMSELVES and "Vector" in each.inputs and not each.inputs["Vector"].is_linked:
-            tree.links.new(vector, each.inputs["Vector"])
-    for background in backgrounds:
-        _tint(tree, background, node)
+    outputs = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.TINT, world_group.FAULT)]
+    _bend(tree, _Sources(*outputs), {node.name})
     return node
 
 
-def _tint(tree: bpy.types.NodeTree, background: bpy.types.Node, group: bpy.types.Node) -> None:
+def _bend(tree: bpy.types.NodeTree, sources: _Sources, ours: set[str]) -> None:
+    """Let the nodes of a tree look along bent rays, and those of the groups in it."""
+    nodes = [node for node in tree.nodes if node.name not in ours]
+    _bend_coordinates(tree, nodes, sources.vector)
+    for node in nodes:
+        if node.type in _LOOK_BY_THEMSELVES and "Vector" in node.inputs and not node.inputs["Vector"].is_linked:
+            tree.links.new(sources.vector, node.inputs["Vector"])
+        elif node.type == "BACKGROUND":
+            _tint(tree, node, sources)
+        elif node.type == "GROUP" and node.node_tree is not None:
+            _bend_group(tree, node, node.node_tree.copy(), sources)
+
+
+def _bend_coordinates(tree: bpy.types.NodeTree, nodes: list[Any], vector: bpy.types.NodeSocket) -> None:
+    """Let what takes the ray's direction, or its opposite, take the bent one."""
+    against = None
+    for node in nodes:
+        along_names, against_names = _ALONG.get(node.type, set()), _AGAINST.get(node.type, set())
+        for socket in node.outputs:
+            targets = [link.to_socket for link in socket.links]
+            if socket.name == "Object" and node.object is not None:  # as it stands, which cannot be followed
+                continue
+            if socket.name in along_names:
+                for each in targets:
+                    tree.links.new(vector, each)
+            elif targets and socket.name in against_names:
+                if against is None:
+                    against = tree.nodes.new("ShaderNodeVectorMath")
+                    against.operation = "SCALE"
+                    against.name = against.label = "Umbra Opposite"
+                    against.inputs["Scale"].default_value = -1.0
+                    tree.links.new(vector, against.inputs[0])
+                for each in targets:
+                    tree.links.new(against.outputs[0], each)
+
+
+def _bend_group(tree: bpy.types.NodeTree, node: Any, inner: bpy.types.NodeTree, sources: _Sources) -> None:
+    """Let a node's copy of its group look along bent rays: the results come in by sockets of its own."""
+    inner[_COPY] = True
+    node.node_tree = inner
+    entry = inner.nodes.new("NodeGroupInput")
+    entry.location = (min(each.location.x for each in inner.nodes) - 320.0, 0.0)
+    passed = []
+    for name, outer in (("Vector", sources.vector), ("Tint", sources.tint), ("Fault", sources.fault)):
+        added = inner.interface.new_socket(f"Umbra {name}", in_out="INPUT", socket_type="NodeSocketVector")
+        tree.links.new(outer, next(each for each in node.inputs if each.identifier == added.identifier))
+        passed.append(next(each for each in entry.outputs if each.identifier == added.identifier))
+    _bend(inner, _Sources(*passed), {entry.name})
+
+
+def _tint(tree: bpy.types.NodeTree, background: bpy.types.Node, sources: _Sources) -> None:
     """Let a Background's color pass by the group's Tint and Fault."""
     color = background.inputs["Color"]
     tint = tree.nodes.new("ShaderNodeVectorMath")
@@ -234,6 +301,19 @@ def _tint(tree: bpy.types.NodeTree, background: bpy.types.Node, group: bpy.types
         tree.links.new(color.links[0].from_socket, tint.inputs[0])
     else:
         tint.inputs[0].default_value = tuple(color.default_value)[:3]
-    tree.links.new(group.outputs[world_group.TINT.name], tint.inputs[1])
-    tree.links.new(group.outputs[world_group.FAULT.name], tint.inputs[2])
+    tree.links.new(sources.tint, tint.inputs[1])
+    tree.links.new(sources.fault, tint.inputs[2])
     tree.links.new(tint.outputs["Vector"], color)
+
+
+def unbent(scene: bpy.types.Scene) -> list[str]:
+    """Return what of a World is shown as it is, in sentences."""
+    world = scene.get(BEFORE)
+    if lensed_world(scene) is None or world is None or world.node_tree is None:
+        return []
+    found = []
+    for node in _all_nodes(world.node_tree):
+        linked = {each.name for each in node.outputs if each.is_linked}
+        if node.type == "TEX_COORD" and (linked & {"Camera", "Window"} or ("Object" in linked and node.object)):
+            found.append(f'What World "{world.name}" takes from the node "{node.name}" is not bent: use Generated.')
+    return found

@@ -10,10 +10,11 @@ from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import world_group
+from ...scene import environment
 from ...scene.frame_setup import FrameSetup, Traits
 from ..protocol import Look, Notice, Output
-from ..shared import sequencer
-from ..shared.look import CARRIED, PLACEMENT, look_of_group, write_to_group
+from ..shared import sequencer, world_files
+from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
 
@@ -42,12 +43,20 @@ class WorldOutput(Output):
     def install(self, scene: bpy.types.Scene, look: Look) -> list[str]:
         """Give the scene a lensed copy of its World; the artist's own values stay in one that is there."""
         is_new = lensed_world.lensed_world(scene) is None
-        node = lensed_world.install(scene)
+        has_taken = environment.take_world(scene)
+        try:
+            node = lensed_world.install(scene)
+        except SceneError:
+            if has_taken:
+                environment.leave_world(scene)
+            raise
+        if has_taken:  # what the stars were brightened by
+            look = look | {EXPOSURE: 0.0}
         if is_new:
             write_to_group(node, {name: value for name, value in look.items() if name in CARRIED})
             if PLACEMENT["Rotation"] in look:
                 lensed_world.place(scene, look[PLACEMENT["Rotation"]], look.get(PLACEMENT["Strength"], 1.0))
-        return []
+        return lensed_world.unbent(scene)
 
     def remove(self, scene: bpy.types.Scene) -> None:
         """Put the World back that was there."""
@@ -92,6 +101,7 @@ class WorldOutput(Output):
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let the World read the frame's map."""
         (wanted,) = self.map_requests(scene, frame)
+        world_files.check(scene)
         _check_resolved(wanted, frame)
         world_sync.point_at_files(scene)
         world_sync.forget_loaded_map(scene)
@@ -130,6 +140,7 @@ class WorldOutput(Output):
             check_world(scene)
         except SceneError as error:
             found.append(Notice(error.for_user(), "ERROR"))
+        found += [Notice(each) for each in lensed_world.unbent(scene)]
         return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
