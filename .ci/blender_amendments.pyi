@@ -64,6 +64,9 @@ class Material:
 class UIPopupMenu:
     layout: UILayout
 
+class KeyMapItem:
+    properties: typing.Any  # those of its operator
+
 # --- Blender calls these, and always with a context --------------------------------------------------
 
 class Panel:
@@ -150,6 +153,8 @@ class Camera:
 class _GenericUI:
     @classmethod
     def append(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
+    @classmethod
+    def prepend(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
     @classmethod
     def remove(cls, draw_func: collections.abc.Callable[..., None]) -> None: ...
 

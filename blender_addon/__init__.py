@@ -23,6 +23,7 @@ from .ui import (
     operators,
     panels,
     preview_panel,
+    render_operators,
 )
 
 _CLASSES = (
@@ -31,6 +32,7 @@ _CLASSES = (
     *scene_properties.CLASSES,
     *operators.CLASSES,
     *bake_operators.CLASSES,
+    *render_operators.CLASSES,
     *panels.CLASSES,
     *disk_panel.CLASSES,
     *cache_panel.CLASSES,
@@ -47,6 +49,7 @@ _MODULES = (
     outputs,
     live_preview,
     operators,
+    render_operators,
     preview_panel,
     handlers,
     command_line,

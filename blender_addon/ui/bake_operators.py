@@ -81,6 +81,7 @@ class BakeOperator(_Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         summary = baking.drain(self._start(context), announce=bpy.app.background, doing=self.doing)
         self._report(summary)
+        self.after(context, beside_interface=False)
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -114,7 +115,9 @@ class BakeOperator(_Operator):
                 progress = next(self._steps)
         except StopIteration as end:
             self._report(end.value)
-            return self._end(context, {"FINISHED"})
+            self._end(context, {"FINISHED"})
+            self.after(context, beside_interface=True)
+            return {"FINISHED"}
         except physics.BlackHoleError as error:
             self.report({"ERROR"}, error.for_user())
             return self._end(context, {"CANCELLED"})
@@ -145,6 +148,9 @@ class BakeOperator(_Operator):
         context.workspace.status_text_set(None)
         _redraw(context)
         return result
+
+    def after(self, context: bpy.types.Context, *, beside_interface: bool) -> None:
+        """Do what comes after the work, if anything; beside the interface, or at once."""
 
     def _report(self, summary: Any) -> None:
         """Report the result of the steps."""

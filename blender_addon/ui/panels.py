@@ -6,7 +6,7 @@ import bpy
 from ..outputs import registry
 from ..scene import frame_setup
 from ..settings.hole_properties import CAMERA_ANIMATION
-from . import bake_operators, status
+from . import bake_operators, render_operators, status
 from .sidebar import HolePanel, UmbraPanel
 
 
@@ -59,6 +59,10 @@ class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")
         row.operator("umbra.bake_animation", icon="RENDER_ANIMATION")
+        if render_operators.may_bake(scene):
+            row = layout.row(align=True)
+            row.operator("umbra.render_frame", text="Render Image")
+            row.operator("umbra.render_animation", text="Render Animation")
 
 
 class VIEW3D_PT_umbra_hole(UmbraPanel, bpy.types.Panel):

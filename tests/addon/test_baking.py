@@ -9,6 +9,7 @@ from types import ModuleType, SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from modal_stand_in import ESCAPE, MOUSE, TIMER, Window
 from small_scene import add_hole, find_map, plain_name, render
 
 
@@ -199,27 +200,6 @@ def test_a_scene_that_vanishes_ends_the_bake(scene: bpy.types.Scene, addon_modul
         list(steps)
 
 
-class Window:
-    """What the modal operator needs of Blender's window, for a test without one."""
-
-    def __init__(self, scene: bpy.types.Scene) -> None:
-        self.scene = scene
-        self.view_layer = scene.view_layers[0]
-        self.window = object()
-        self.workspace = SimpleNamespace(status_text_set=lambda text: setattr(self, "status", text))
-        self.status = ""
-        self.removed = 0
-        self.window_manager = SimpleNamespace(
-            windows=[],
-            progress_begin=lambda *_: None,
-            progress_update=lambda _: None,
-            progress_end=lambda: None,
-            event_timer_add=lambda *_, **__: "timer",
-            event_timer_remove=lambda _: setattr(self, "removed", self.removed + 1),
-            modal_handler_add=lambda _: None,
-        )
-
-
 @pytest.fixture
 def modal(addon_module: Callable[[str], ModuleType]) -> SimpleNamespace:
     """The operator's methods on a stand-in, because Blender makes operators only in windows."""
@@ -233,11 +213,6 @@ def modal(addon_module: Callable[[str], ModuleType]) -> SimpleNamespace:
             reports.append((kind, text))
 
     return SimpleNamespace(operator=Stand(), reports=reports, module=operators)
-
-
-TIMER = SimpleNamespace(type="TIMER", value="NOTHING")
-ESCAPE = SimpleNamespace(type="ESC", value="PRESS")
-MOUSE = SimpleNamespace(type="MOUSEMOVE", value="NOTHING")
 
 
 def test_modal_bake(scene: bpy.types.Scene, tmp_path: Path, modal: SimpleNamespace) -> None:
