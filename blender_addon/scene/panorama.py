@@ -19,8 +19,12 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.physics_api import physics
+from ..core.session import SESSION, Life
 from . import image_world, sky_frames, world_digest
 from .node_paths import reachable
+
+is_rendering = SESSION.value(bool, Life.RENDER)
+"""Whether a render of a scene with a sky runs, in which no other one can."""
 
 KEY = "umbra_panorama"
 """Custom property of the image: the digest of what it shows."""
@@ -171,10 +175,8 @@ def _render(world: bpy.types.World, width: int, name: str, digest: str, stamp: s
     path = Path(bpy.app.tempdir) / f"umbra_panorama_{digest}.exr"
     try:
         _render_to(path, world, width)
-        pixels, _header = physics.read_exr(path)
-        pixels = pixels[..., :3]
-        if np.abs(pixels).max() < _LARGEST_HALF:  # half the size, and as exact as a sky needs
-            physics.write_exr(path, pixels.astype(np.float16))
+        with contextlib.suppress(physics.BlackHoleError):  # then it stays in single precision
+            _make_small(path)
         return _keep(path, f"{name} Panorama", digest, stamp)
     except (RuntimeError, OSError) as error:
         raise SceneError(
@@ -185,8 +187,15 @@ def _render(world: bpy.types.World, width: int, name: str, digest: str, stamp: s
         path.unlink(missing_ok=True)
 
 
+def _make_small(path: Path) -> None:
+    """Write a picture in half precision, which is as exact as a sky needs, unless the sun in it is too bright."""
+    pixels, _header = physics.read_exr(path)
+    if np.abs(pixels).max() < _LARGEST_HALF:
+        physics.write_exr(path, pixels[..., :3].astype(np.float16))
+
+
 def _render_to(path: Path, world: bpy.types.World, width: int) -> None:
-    if bpy.app.is_job_running("RENDER"):
+    if is_rendering.now or bpy.app.is_job_running("RENDER"):
         raise RuntimeError("a render is running")
     scene = bpy.data.scenes.new("Umbra Panorama")
     camera = bpy.data.cameras.new("Umbra Panorama")

@@ -61,8 +61,10 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         was_world = settings.environment_source == "WORLD"
         report_notes(self, registry.of(scene).on_hole_added(scene))
         image = settings.environment_image
-        if was_world and settings.environment_source == "IMAGE" and image is not None:
-            self.report({"INFO"}, f'The sky is the image "{image.name}"; Sky in the Umbra panel chooses another.')
+        has_changed = was_world and settings.environment_source == "IMAGE"
+        if has_changed and image is not None and environment.world_left_out(scene) is None:
+            why = "The scene has no World" if scene.world is None else f'World "{scene.world.name}" is a plain color'
+            self.report({"INFO"}, f'{why}: the sky is the image "{image.name}".')
         if len(frame_setup.holes(scene)) > 1:
             self.report({"WARNING"}, only_one_is_rendered(scene))
         if scene.camera is None:

@@ -494,3 +494,13 @@ def test_the_lens_keeps_the_sky_that_was_chosen(scene: bpy.types.Scene) -> None:
 def tree_of(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     """The scene's compositor."""
     return scene.node_tree if bpy.app.version < (5, 0) else scene.compositing_node_group
+
+
+def test_the_plain_world_of_a_new_scene_is_said_to_be_one(
+    scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str]
+) -> None:
+    environment_image(name=STAR_SKY)
+    add_hole(scene, sky=False)
+    said = "".join(capfd.readouterr())
+    assert said.count('World "World" is a plain color: the sky is the image "Umbra Star Sky"') == 1
+    assert "Warning" not in said

@@ -11,7 +11,7 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment
+from ...scene import environment, panorama
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
@@ -167,6 +167,7 @@ class CompositorOutput(Output):
 
     def begin_render(self, scene: bpy.types.Scene) -> None:
         """Mend what was changed by hand inside the set-up; refuse what cannot be mended."""
+        panorama.is_rendering.now = True
         if compositor_sync.repair(scene):
             messages.warn(
                 f'the node group "{black_hole_group.GROUP_NAME}" was damaged or of another version, and is built anew.'
