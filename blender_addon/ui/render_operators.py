@@ -5,14 +5,19 @@ A render that bakes by itself shows no progress meanwhile, and nothing can end i
 that; F12 and Ctrl F12 come here first, and go on to Blender's own where there is nothing to bake.
 """
 
+import time
+
 import bpy
 
 from ..bake import baking
+from ..bake.check import is_valid
+from ..core.physics_api import physics
 from ..outputs import frames as frame_maps
 from ..outputs import registry
 from ..scene import frame_setup
 from . import bake_operators
 from .bake_operators import BakeOperator, Steps
+from .reporting import SLICE
 
 # Where Blender has its own F12.
 KEYMAP = "Screen"
@@ -47,11 +52,23 @@ class RenderOperator(BakeOperator):
             return self.execute(context)
         if self._is_baking():
             return {"CANCELLED"}
-        if may_bake(context.scene) and not bpy.app.is_job_running("RENDER"):
+        if not bpy.app.is_job_running("RENDER") and may_bake(context.scene) and not self._has_maps(context.scene):
             return self._begin(context)
         if self.by_key:
             return {"PASS_THROUGH"}
         return self._render(beside_interface=True)
+
+    def _has_maps(self, scene: bpy.types.Scene) -> bool:
+        """Whether all maps are found valid within a slice of time; then the render starts without a detour."""
+        until = time.perf_counter() + SLICE
+        try:
+            for frame in self.frames(scene):
+                needed = frame_maps.requests_at(scene, frame)
+                if time.perf_counter() > until or not all(is_valid(wanted) for wanted in needed):
+                    return False
+        except physics.BlackHoleError:  # the bake says what is wrong
+            return False
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self._is_baking():

@@ -112,6 +112,12 @@ def test_in_a_window_a_key_goes_on_to_blenders_own_where_there_is_nothing_to_bak
     assert "being baked" in stand.reports[-1][1]
     assert stand.operator.modal(window, ESCAPE) == {"CANCELLED"}
     assert len(stand.renders) == 1
+    monkeypatch.setattr(operators, "SLICE", 60.0)
+    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
+    assert stand.operator.invoke(Window(scene), TIMER) == {"PASS_THROUGH"}
+    stand.operator.by_key = False
+    assert stand.operator.invoke(Window(scene), TIMER) == {"FINISHED"}
+    assert len(stand.renders) == 2
 
 
 def test_the_render_starts_when_the_maps_are_there(
