@@ -18,6 +18,7 @@ from .accuracy_check.accuracy import (
 from .accuracy_check.accuracy import DEFAULT_SAMPLES as DEFAULT_ACCURACY_SAMPLES
 from .accuracy_check.accuracy_report import AccuracyReport, DiskAccuracy
 from .disk_passes.disk_pass import DiskPass
+from .files.companions import COMPANION_MARKS, files_beside, write_map_files
 from .files.disk_pass_file import FORMAT as DISK_PASS_FORMAT
 from .files.disk_pass_file import (
     find_pass,
@@ -123,6 +124,7 @@ __all__ = [
     "BOLOMETRIC_EXPONENT",
     "CHANNEL_WAVELENGTHS",
     "COLDEST_DISK",
+    "COMPANION_MARKS",
     "DEFAULT_ACCURACY_SAMPLES",
     "DEFAULT_CROSSINGS",
     "DEFAULT_ENVIRONMENT_WIDTH",
@@ -212,6 +214,7 @@ __all__ = [
     "drain",
     "ergosphere_radius",
     "exr_library",
+    "files_beside",
     "find_pass",
     "galactic_axes",
     "horizon_radius",
@@ -253,6 +256,7 @@ __all__ = [
     "write_disk_passes",
     "write_exit_map",
     "write_exr",
+    "write_map_files",
     "write_png",
     "write_warp_map",
     "write_world_map",

@@ -149,8 +149,9 @@ class FolderNames:
 
     def _owner(self, match: re.Match[str]) -> Path:
         """The map that a file is one with: a disk's pass is its map's."""
-        crossing = f"_disk{match['crossing']}_"
-        return self.folder / match.string.replace(crossing, "_", 1 if match["crossing"] else 0)
+        end = match.start("beside")
+        whole = match.string if end < 0 else match.string[:end] + match.string[match.end("beside") + 1 :]
+        return self.folder / whole
 
     def superseded(self, wanted: MapRequest) -> tuple[Path, ...]:
         """Files of the same frame, size and kind that the request has no use for: older maps, and passes too many."""
@@ -164,7 +165,7 @@ class FolderNames:
             for each in others
             if each.string not in own
             and kind_of(each) is wanted.kind
-            and (wanted.kind.is_hashed or each["crossing"] is not None)
+            and (wanted.kind.is_hashed or each["beside"] is not None)
         )
 
 

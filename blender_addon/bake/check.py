@@ -8,7 +8,6 @@ import bpy
 
 from ..core.physics_api import physics
 from .folder import folder
-from .kinds import PASS_FORMAT
 from .names import SEQUENCE_LENGTH, kind_of, name_pattern, shot_name
 from .request import MapRequest, older_maps
 
@@ -32,10 +31,10 @@ def check(wanted: MapRequest, *, thorough: bool = True) -> physics.MapFinding:
     found = physics.check_map(wanted.path, kind.format, wanted.parameters, thorough=thorough)
     if found.state is State.MISSING and older_maps(wanted):
         return physics.MapFinding(State.STALE, f"The {kind.noun} {wanted.path} is out of date")
-    for one in wanted.passes:
+    for path, form in list(wanted.formats().items())[1:]:
         if found.state is not State.VALID:
             break
-        found = physics.check_map(one, PASS_FORMAT, wanted.parameters, thorough=thorough)
+        found = physics.check_map(path, form, wanted.parameters, thorough=thorough)
     return found
 
 
@@ -75,6 +74,6 @@ def count_baked(scene: bpy.types.Scene, hole_name: str, like: MapRequest, frames
     numbers = {
         int(match["number"])
         for match in matches
-        if match["size"] == size and match["crossing"] is None and kind_of(match) is like.kind
+        if match["size"] == size and match["beside"] is None and kind_of(match) is like.kind
     }
     return sum(frame % SEQUENCE_LENGTH in numbers for frame in frames)

@@ -38,8 +38,8 @@ class MapKind:
 
     Cycles keeps textures by their names, and a map that is baked again must not be taken for the one before.
     """
-    has_passes: bool = False
-    """Whether a disk's passes lie beside the map."""
+    has_companions: bool = False
+    """Whether other files lie beside the map and are one with it, such as a disk's passes."""
 
     @property
     def hash_mark(self) -> str:
@@ -47,13 +47,7 @@ class MapKind:
         return f"_{self.noun.partition(' ')[0]}_"
 
 
-def _write_warp_map(path: Path, warp_map: "physics.WarpMap") -> None:
-    """Write a map and its disk's passes; the map comes last, so that where it is valid they are there."""
-    physics.write_disk_passes(path, warp_map.disk_passes)
-    physics.write_warp_map(path, warp_map)
-
-
-WARP_MAP = MapKind("warp map", physics.WARP_MAP_FORMAT, _warp_map_steps, _write_warp_map, has_passes=True)
+WARP_MAP = MapKind("warp map", physics.WARP_MAP_FORMAT, _warp_map_steps, physics.write_map_files, has_companions=True)
 EXIT_MAP = MapKind(
     "exit map", physics.EXIT_MAP_FORMAT, physics.bake_exit_map_steps, physics.write_exit_map, is_hashed=True
 )
@@ -61,5 +55,3 @@ WORLD_MAP = MapKind(
     "world map", physics.WORLD_MAP_FORMAT, physics.bake_world_map_steps, physics.write_world_map, mark="world_"
 )
 KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP]
-
-PASS_FORMAT = physics.DISK_PASS_FORMAT

@@ -116,14 +116,14 @@ def file_name(
 def name_pattern(shot: str | None = None) -> re.Pattern[str]:
     """Return a pattern for the names of all files of a shot, by what they begin with, or of all shots.
 
-    Its groups are `shot`, `size`, `crossing` (of a pass), `mark`, `number` and `hash`, the last with what stands before
-    it.
+    Its groups are `shot`, `size`, `beside` (of a file beside a map: what tells it from the map), `mark`, `number` and
+    `hash`, the last with what stands before it.
     """
     marks = "|".join(kind.mark for kind in KINDS if kind.mark)
     hashes = "|".join(kind.hash_mark for kind in KINDS if kind.is_hashed)
     return re.compile(
         rf"(?P<shot>{'.+' if shot is None else re.escape(shot)})"
-        rf"_(?P<size>\d+x\d+)_(?:disk(?P<crossing>\d+)_|(?P<mark>{marks}))?(?P<number>\d{{4,7}})"
+        rf"_(?P<size>\d+x\d+)_(?:(?P<beside>{physics.COMPANION_MARKS})_|(?P<mark>{marks}))?(?P<number>\d{{4,7}})"
         rf"(?P<hash>(?:{hashes})[0-9a-f]+)?\.exr"
     )
 

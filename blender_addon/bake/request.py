@@ -23,22 +23,21 @@ class MapRequest:
     parameters: "physics.WarpMapParameters"
     folder: MapFolder
 
-    @property
-    def passes(self) -> tuple[Path, ...]:
-        """Where the disk's passes lie; none if the map has no disk."""
-        return self.passes_of(self.path)
-
-    def passes_of(self, path: Path) -> tuple[Path, ...]:
-        """Where the disk's passes lie beside a map of the same disk."""
-        disk = self.parameters.disk if self.kind.has_passes else None
-        return tuple(
-            Path(physics.pass_path(path, number + 1)) for number in range(0 if disk is None else disk.crossings)
-        )
+    def formats(self, path: Path | None = None) -> dict[Path, "physics.MapFormat"]:
+        """Return all files of the request, the map first, with their formats; if wanted, of a map at another path."""
+        place = self.path if path is None else path
+        beside = physics.files_beside(place, self.parameters) if self.kind.has_companions else ()
+        return {place: self.kind.format, **dict(beside)}
 
     @property
     def files(self) -> tuple[Path, ...]:
         """All files of the request, the map first."""
-        return (self.path, *self.passes)
+        return tuple(self.formats())
+
+    @property
+    def passes(self) -> tuple[Path, ...]:
+        """Where the disk's passes lie; none if the map has no disk."""
+        return tuple(path for path, form in self.formats().items() if form is physics.DISK_PASS_FORMAT)
 
     @property
     def what(self) -> str:

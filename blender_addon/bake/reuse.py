@@ -31,7 +31,7 @@ class OtherNames:
             names = []
         for name in names:
             match = self._pattern.fullmatch(name)
-            if match is not None and match["crossing"] is None:
+            if match is not None and match["beside"] is None:
                 self._maps.setdefault(_place(match), []).append(folder / name)
 
     def take_over(self, wanted: MapRequest) -> bool:
@@ -47,9 +47,10 @@ class OtherNames:
         match = self._pattern.fullmatch(wanted.path.name)
         for other in self._maps.get(_place(match), ()) if match is not None else ():
             if other != wanted.path and _is_it(other, wanted):
-                for source, target in zip(wanted.passes_of(other), wanted.passes, strict=True):
+                pairs = list(zip(wanted.formats(other), wanted.files, strict=True))
+                for source, target in pairs[1:]:
                     link(source, target, copy=True)
-                return link(other, wanted.path, copy=True)
+                return link(*pairs[0], copy=True)
         return False
 
 
@@ -58,11 +59,10 @@ def _place(match: re.Match[str]) -> _Place:
 
 
 def _is_it(path: Path, wanted: MapRequest) -> bool:
-    """Whether a map, and its disk's passes, are those that are wanted, by their headers."""
-    formats = [(path, wanted.kind.format), *((one, physics.DISK_PASS_FORMAT) for one in wanted.passes_of(path))]
+    """Whether a map, and the files beside it, are those that are wanted, by their headers."""
     return all(
-        physics.check_map(each, kind, wanted.parameters, thorough=False).state is physics.MapState.VALID
-        for each, kind in formats
+        physics.check_map(each, form, wanted.parameters, thorough=False).state is physics.MapState.VALID
+        for each, form in wanted.formats(path).items()
     )
 
 

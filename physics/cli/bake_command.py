@@ -10,8 +10,8 @@ import os
 import time
 from pathlib import Path
 
-from ..files import disk_pass_file, warp_map_file
-from ..files.disk_pass_file import pass_path, write_disk_pass
+from ..files import warp_map_file
+from ..files.companions import files_beside, write_companions
 from ..files.warp_map_file import write_warp_map
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
 from ..images.exr import replacing
@@ -106,9 +106,8 @@ def run(options: argparse.Namespace) -> None:
         disk=disk_options.disk_of(options),
     )
     parameters.validate()
-    count = 0 if parameters.disk is None else parameters.disk.crossings
-    passes = [Path(pass_path(options.output, crossing)) for crossing in range(1, count + 1)]
-    check_maps({options.output: warp_map_file.FORMAT, **dict.fromkeys(passes, disk_pass_file.FORMAT)})
+    beside = dict(files_beside(options.output, parameters))
+    check_maps({options.output: warp_map_file.FORMAT, **beside})
     warning = unstable_orbit_warning(parameters)
     if warning:
         note(f"note: {warning}")
@@ -116,10 +115,9 @@ def run(options: argparse.Namespace) -> None:
     warp_map = bake(parameters, progress=ProgressPrinter())
     with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
         map_file = together.enter_context(replacing(options.output))
-        for path, one in zip(passes, warp_map.disk_passes, strict=True):
-            write_disk_pass(together.enter_context(replacing(path)), one)
+        write_companions(options.output, warp_map, lambda path: together.enter_context(replacing(path)))
         write_warp_map(map_file, warp_map)
-        say("\n".join(_summary(options.output, passes, warp_map, time.perf_counter() - started)))
+        say("\n".join(_summary(options.output, list(beside), warp_map, time.perf_counter() - started)))
     lost, unresolved = warp_map.counts.get("disk_unresolved", 0), warp_map.counts["unresolved"]
     if lost:
         note(f"note: the disk could not be resolved in {lost} pixels and is missing there")

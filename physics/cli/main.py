@@ -6,15 +6,12 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 from ..images.exr_library import exr_library
 from ..numerics import interrupts
 from ..numerics.errors import BlackHoleError
 from . import accuracy_command, bake_command, console, render_command, verify_command
-
-if TYPE_CHECKING:
-    from _typeshed import SupportsWrite
 
 
 class Command(Protocol):
@@ -92,7 +89,7 @@ def _failed(error: BlackHoleError) -> int:
 class Parser(argparse.ArgumentParser):
     """A parser that says so where its help cannot be printed."""
 
-    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+    def print_help(self, file: Any = None) -> None:
         """Print the help, by default on standard output."""
         if file is None:
             console.say(self.format_help().rstrip("\n"))

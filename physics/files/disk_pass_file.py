@@ -15,6 +15,8 @@ from ..disk_passes.disk_pass import DiskPass
 from ..images.exr import PathLike
 from ..maps.warp_map import WarpMap
 from ..numerics.errors import BlackHoleError, WarpMapError
+from ..shot.map_parameters import WarpMapParameters
+from .companion import Companion
 from .map_file import MapFormat, advice
 
 FORMAT = MapFormat(
@@ -183,3 +185,15 @@ def read_disk_pass(path: PathLike) -> DiskPass:
     if not (fits and disk and crossing.isdigit() and 1 <= int(crossing) <= disk["crossings"]):
         raise WarpMapError(advice(f"{path} is damaged: it holds values that no disk pass has."), code="map.damaged")
     return DiskPass(radius, phi, g, coverage, {**metadata, "crossing": int(crossing)})
+
+
+def _paths(map_path: PathLike, parameters: WarpMapParameters) -> tuple[Path, ...]:
+    count = 0 if parameters.disk is None else parameters.disk.crossings
+    return tuple(Path(pass_path(map_path, crossing)) for crossing in range(1, count + 1))
+
+
+def _write(path: PathLike, warp_map: WarpMap, number: int) -> None:
+    write_disk_pass(path, warp_map.disk_passes[number])
+
+
+COMPANION = Companion(FORMAT, read_disk_pass, r"disk\d+", _paths, _write)

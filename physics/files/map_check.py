@@ -15,7 +15,8 @@ from ..images.exr_header import MAGIC
 from ..numerics.errors import ImageFileError, WarpMapError
 from ..shot.identity import hash_of
 from ..shot.map_parameters import WarpMapParameters
-from . import disk_pass_file, exit_map_file, warp_map_file, world_map_file
+from . import exit_map_file, warp_map_file, world_map_file
+from .companions import COMPANIONS
 from .map_file import ATTRIBUTE_FORMAT, MapFormat
 
 # Readers that check every pixel, by the format that they read.
@@ -23,7 +24,7 @@ READERS: dict[MapFormat, Callable[[PathLike], object]] = {
     warp_map_file.FORMAT: warp_map_file.read_warp_map,
     exit_map_file.FORMAT: exit_map_file.read_exit_map,
     world_map_file.FORMAT: world_map_file.read_world_map,
-    disk_pass_file.FORMAT: disk_pass_file.read_disk_pass,
+    **{each.format: each.read for each in COMPANIONS},
 }
 
 
