@@ -7,8 +7,8 @@ from types import ModuleType
 
 import bpy
 import pytest
+from modal_stand_in import ESCAPE, TIMER, Window
 from small_scene import add_hole, find_map, plain_name
-from test_baking import ESCAPE, TIMER, Window
 
 
 @pytest.fixture
@@ -82,8 +82,14 @@ def test_passes_that_are_not_needed_any_more(scene: bpy.types.Scene, tmp_path: P
     assert [plain_name(path) for path in (tmp_path / "maps").iterdir()] == ["Scene_Black_Hole_64x36_0001.exr"]
 
 
-def test_beside_the_interface(scene: bpy.types.Scene, tmp_path: Path, panel: ModuleType) -> None:
+def test_beside_the_interface(
+    scene: bpy.types.Scene,
+    panel: ModuleType,
+    addon_module: Callable[[str], ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """With progress, and Esc; the stand-in is there because Blender makes operators only in windows."""
+    monkeypatch.setattr(addon_module("ui.bake_operators"), "SLICE", 0.0)  # one step at a time
     add_hole(scene)
     bpy.ops.umbra.bake_animation()
     reports: list[str] = []
