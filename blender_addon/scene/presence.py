@@ -21,7 +21,8 @@ def is_absent(scene: bpy.types.Scene, frame: int | None = None) -> bool:
         return not frame_setup.holes(scene)
     if _is_hidden(hole, scene.frame_current if frame is None else frame):
         return True
-    return not any(is_enabled(hole, layer.layer_collection, "hide_render") for layer in scene.view_layers if layer.use)
+    layers = [layer.layer_collection for layer in scene.view_layers if layer.use]
+    return bool(layers) and not any(is_enabled(hole, layer, "hide_render") for layer in layers)
 
 
 def _is_hidden(hole: bpy.types.Object, frame: int) -> bool:

@@ -55,11 +55,12 @@ class Painting:
 
     def counts(self) -> dict[str, int]:
         """Number of pixels by what they see, and of the rays traced for them."""
-        whole = int(np.count_nonzero(self._visibility == 1.0))
-        dark = int(np.count_nonzero(self._visibility == 0.0))
+        found = self._one_plus_z != UNRESOLVED_ONE_PLUS_Z
+        whole = int(np.count_nonzero(found & (self._visibility == 1.0)))
+        dark = int(np.count_nonzero(found & (self._visibility == 0.0)))
         return {
-            "sky": whole - self._unresolved,
-            "edge": self._visibility.size - whole - dark,
+            "sky": whole,
+            "edge": int(np.count_nonzero(found)) - whole - dark,
             "shadow": dark,
             "unresolved": self._unresolved,
             "rays": self._rays,

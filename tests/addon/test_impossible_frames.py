@@ -82,9 +82,9 @@ def test_a_frame_whose_rays_cannot_be_traced(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """It fails in the work, and not before."""
-    request = addon_module("bake.request")
+    kinds = addon_module("bake.kinds")
     error = addon_module("core.errors").SceneError
-    steps = request._baker.now.steps
+    steps = kinds._baker.now.steps
 
     def failing(parameters):
         if parameters.camera_position[0] > 8.5:
@@ -92,7 +92,7 @@ def test_a_frame_whose_rays_cannot_be_traced(
             raise error("It went wrong.", code="map.unresolved")
         return (yield from steps(parameters))
 
-    monkeypatch.setattr(request._baker.now, "steps", failing)
+    monkeypatch.setattr(kinds._baker.now, "steps", failing)
     shot.umbra.active_hole.umbra.mass_scale = 1.0
     shot.camera.animation_data_clear()
     for frame, x in ((1, 9.0), (2, 8.0), (3, 7.0)):

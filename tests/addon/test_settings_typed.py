@@ -34,4 +34,4 @@ def test_declarations_are_those_of_blenders_properties(
     row_types = {name: kind for name, kind in types_of(hole.disk).items() if name in rows}
     assert row_types.keys() == rows.keys()
     assert typing.get_type_hints(declared.DiskSettings) | row_types == types_of(hole.disk)
-    assert typing.get_type_hints(declared.SceneSettings) == types_of(scene.umbra)
+    assert typing.get_type_hints(declared.SceneSettings) == types_of(scene.umbra) | {"map_names": str}  # hidden

@@ -92,7 +92,7 @@ def rendered(composed: object, addon_module: Callable[[str], ModuleType], tmp_pa
         tree.links.new(layers, link.to_socket)
     foreground = _render(scene, tmp_path / "foreground.exr")
     sky = addon_module("scene.environment").read(scene)
-    rotation = sky.rotation if sky.rotation_path else tuple(inputs["Environment Rotation"].default_value)
+    rotation = sky.rotation if sky.rotation_at else tuple(inputs["Environment Rotation"].default_value)
     reference = reference_render.render(
         read_warp_map(map_path),
         _packed_pixels(sky.image, tmp_path / "sky.exr"),
