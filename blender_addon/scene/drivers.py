@@ -106,7 +106,8 @@ def _is_finite(driver: bpy.types.Driver, frame: int) -> bool:
         return False
     if driver.type != "SCRIPTED":
         return True
-    names = {**_BUILTINS, **bpy.app.driver_namespace, "frame": float(frame), **known}
+    # Not from bpy.app.driver_namespace: once it was asked for, Blender 4.5 as a Python module does not end.
+    names = {**_BUILTINS, **vars(math), "frame": float(frame), **known}
     for unknown in values.keys() - known.keys():
         names.pop(unknown, None)
     try:
