@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Map requests: the map that a frame needs, the file that holds it, and what it is made from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -28,6 +28,13 @@ class MapRequest:
         place = self.path if path is None else path
         beside = physics.files_beside(place, self.parameters) if self.kind.has_companions else ()
         return {place: self.kind.format, **dict(beside)}
+
+    def lies_at(self, path: Path) -> bool:
+        """Whether the map, with the files beside it, is at a path, by its headers."""
+        return all(
+            physics.check_map(each, form, self.parameters, thorough=False).state is physics.MapState.VALID
+            for each, form in self.formats(path).items()
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -61,23 +68,21 @@ def request(
     name = file_name(scene, frame.hole_name, parameters.map_size, frame.frame, kind, parameters)
     path = where.path / name
     check_path(path)
+    wanted = MapRequest(frame.frame, path, kind, parameters, where)
     if kind.is_hashed and not path.exists():
-        path = next((each for each in _older_maps(path, kind) if _is_it(each, kind, parameters)), path)
-    return MapRequest(frame.frame, path, kind, parameters, where)
-
-
-def _is_it(path: Path, kind: MapKind, parameters: "physics.WarpMapParameters") -> bool:
-    """Whether a file holds the map, baked where the last digits of its parameters, and so its name, were others."""
-    return physics.check_map(path, kind.format, parameters, thorough=False).state is physics.MapState.VALID
+        # It may have been baked where the last digits of its parameters, and so its name, were others.
+        path = next((each for each in older_maps(wanted) if wanted.lies_at(each)), path)
+    return replace(wanted, path=path)
 
 
 def older_maps(wanted: MapRequest) -> list[Path]:
     """Return the maps of the same frame, size and kind that were made from other parameters."""
-    return _older_maps(wanted.path, wanted.kind) if wanted.kind.is_hashed else []
-
-
-def _older_maps(path: Path, kind: MapKind) -> list[Path]:
-    name, mark = path.name, kind.hash_mark
+    if not wanted.kind.is_hashed:
+        return []
+    name, mark = wanted.path.name, wanted.kind.hash_mark
     beginning = name[: name.rindex(mark) + len(mark)]
-    others = path.parent.iterdir() if path.parent.is_dir() else ()
-    return [each for each in others if each.name.startswith(beginning) and each.suffix == ".exr" and each != path]
+    parent = wanted.path.parent
+    others = parent.iterdir() if parent.is_dir() else ()
+    return [
+        each for each in others if each.name.startswith(beginning) and each.suffix == ".exr" and each != wanted.path
+    ]

@@ -9,7 +9,6 @@ import os
 import re
 from pathlib import Path
 
-from ..core.physics_api import physics
 from .folder import link
 from .kinds import MapKind
 from .names import kind_of, name_pattern
@@ -46,7 +45,7 @@ class OtherNames:
         """
         match = self._pattern.fullmatch(wanted.path.name)
         for other in self._maps.get(_place(match), ()) if match is not None else ():
-            if other != wanted.path and _is_it(other, wanted):
+            if other != wanted.path and wanted.lies_at(other):
                 pairs = list(zip(wanted.formats(other), wanted.files, strict=True))
                 for source, target in pairs[1:]:
                     link(source, target, copy=True)
@@ -56,14 +55,6 @@ class OtherNames:
 
 def _place(match: re.Match[str]) -> _Place:
     return match["size"], int(match["number"]), kind_of(match)
-
-
-def _is_it(path: Path, wanted: MapRequest) -> bool:
-    """Whether a map, and the files beside it, are those that are wanted, by their headers."""
-    return all(
-        physics.check_map(each, form, wanted.parameters, thorough=False).state is physics.MapState.VALID
-        for each, form in wanted.formats(path).items()
-    )
 
 
 def carry(source: Path, old: str, target: Path, new: str, *, copy: bool = False) -> int:

@@ -14,9 +14,8 @@ from ..bake.check import is_valid
 from ..core.physics_api import physics
 from ..outputs import frames as frame_maps
 from ..outputs import registry
-from ..scene import frame_setup
 from . import bake_operators
-from .bake_operators import BakeOperator, Steps
+from .bake_operators import BakeOperator, Steps, UMBRA_OT_bake_animation, UMBRA_OT_bake_frame
 from .reporting import SLICE
 
 # Where Blender has its own F12.
@@ -119,8 +118,7 @@ class UMBRA_OT_render_frame(RenderOperator, bpy.types.Operator):
     bl_description = "Bake the maps of the current frame that are missing, with progress, and then render it. Esc stops"
     bl_options = {"REGISTER"}
 
-    def frames(self, scene: bpy.types.Scene) -> list[int]:
-        return [scene.frame_current]
+    frames = UMBRA_OT_bake_frame.frames
 
 
 class UMBRA_OT_render_animation(RenderOperator, bpy.types.Operator):
@@ -132,9 +130,7 @@ class UMBRA_OT_render_animation(RenderOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     animation = True
-
-    def frames(self, scene: bpy.types.Scene) -> list[int]:
-        return list(frame_setup.frames_of(scene))
+    frames = UMBRA_OT_bake_animation.frames
 
 
 def draw_render_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
