@@ -30,6 +30,8 @@ from .files.disk_pass_file import (
 )
 from .files.exit_map_file import FORMAT as EXIT_MAP_FORMAT
 from .files.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
+from .files.footprint_file import FORMAT as FOOTPRINT_FORMAT
+from .files.footprint_file import footprint_path, read_footprint, write_footprint
 from .files.map_check import Finding as MapFinding
 from .files.map_check import State as MapState
 from .files.map_check import check_map
@@ -44,6 +46,7 @@ from .images.exr import read_exr, read_exr_header, write_exr
 from .images.exr import replacing as replacing_file
 from .images.exr import target_of as temporary_target
 from .images.exr_library import exr_library
+from .images.picture import linear_from_srgb
 from .images.png import write_png
 from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
 from .kerr.observer import Observer, local_velocity
@@ -77,10 +80,14 @@ from .light.disk_texture import pattern_period as disk_pattern_period
 from .light.disk_texture import pattern_shares as disk_pattern_shares
 from .light.milky_way import galactic_axes
 from .light.settings import Choice, Setting
+from .light.sky_levels import FEWEST_ROWS as FEWEST_SKY_ROWS
+from .light.sky_levels import LARGEST_HALF, SkyLevels, sky_levels
+from .light.sky_levels import MARGIN as SKY_LEVEL_MARGIN
 from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
-from .light.sky_settings import SKY_SETTINGS
+from .light.sky_settings import SKY_FILTER, SKY_SETTINGS
 from .light.star_sky import star_sky
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
+from .maps.footprint import footprint
 from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
 from .maps.lens import LensNumbers
 from .maps.sharing import MapBaker, turned_map
@@ -142,9 +149,12 @@ __all__ = [
     "DISK_PROFILES",
     "DISK_SETTINGS",
     "EXIT_MAP_FORMAT",
+    "FEWEST_SKY_ROWS",
+    "FOOTPRINT_FORMAT",
     "HOTTEST_DISK",
     "IDENTITY",
     "INVALID_MAP_COLOR",
+    "LARGEST_HALF",
     "LARGEST_ONE_PLUS_Z",
     "METHODS",
     "MONOCHROMATIC_EXPONENT",
@@ -153,6 +163,8 @@ __all__ = [
     "RESIZE_HALVE_ABOVE",
     "SECOND_RADIATION_CONSTANT",
     "SKY_ARGUMENTS",
+    "SKY_FILTER",
+    "SKY_LEVEL_MARGIN",
     "SKY_SETTINGS",
     "SMALLEST_ALPHA",
     "SMALLEST_G",
@@ -188,6 +200,7 @@ __all__ = [
     "PerspectiveCamera",
     "ReferencePicture",
     "Setting",
+    "SkyLevels",
     "TraceResult",
     "UnstableOrbitWarning",
     "WarpMap",
@@ -216,9 +229,12 @@ __all__ = [
     "exr_library",
     "files_beside",
     "find_pass",
+    "footprint",
+    "footprint_path",
     "galactic_axes",
     "horizon_radius",
     "isco_radius",
+    "linear_from_srgb",
     "local_velocity",
     "looking_at_hole",
     "matter_direction",
@@ -234,6 +250,7 @@ __all__ = [
     "read_exit_map_metadata",
     "read_exr",
     "read_exr_header",
+    "read_footprint",
     "read_warp_map",
     "read_warp_map_metadata",
     "read_world_map",
@@ -244,6 +261,7 @@ __all__ = [
     "render_reference",
     "replacing_file",
     "shade_disk",
+    "sky_levels",
     "star_sky",
     "temporary_target",
     "tinted_disk_light",
@@ -256,6 +274,7 @@ __all__ = [
     "write_disk_passes",
     "write_exit_map",
     "write_exr",
+    "write_footprint",
     "write_map_files",
     "write_png",
     "write_warp_map",

@@ -31,8 +31,8 @@ _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.E
 # Maps that are taken over from other names are hidden under such a name while they are copied.
 _PART = re.compile(r"\.(?P<target>.+\.exr)\.[0-9a-f]+\.part")
 
-# Bytes that Blender keeps of a path, and those by which the name of a disk's pass may be longer than its map's.
-LONGEST_PATH, _LONGEST_PASS = 1023, 8
+# Bytes that Blender keeps of a path, and those by which the name of a file beside a map may be longer than the map's.
+LONGEST_PATH, _LONGEST_PASS = 1023, 10
 
 # What the open file is being saved as, while it is.
 _saved_as: Value[Path | None] = SESSION.value(lambda: None, Life.FILE)

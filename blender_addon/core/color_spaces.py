@@ -36,6 +36,12 @@ def mark_as_linear_rec709(image: bpy.types.Image) -> bool:
     return True
 
 
+def is_linear_rec709(image: bpy.types.Image) -> bool:
+    """Return whether an image's numbers are linear Rec.709."""
+    name = image.colorspace_settings.name
+    return name == _LINEAR_REC709 or _is_linear_rec709(name)
+
+
 def _is_linear_rec709(name: str) -> bool:
     words = set(name.casefold().replace("_", " ").replace("(", " ").replace(")", " ").replace("-", " ").split())
     return all(words & each for each in _WORDS)

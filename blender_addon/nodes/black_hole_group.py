@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The compositor node group "Umbra Black Hole": its sockets and its version.
+"""The compositor node groups "Umbra Black Hole": their sockets and their version.
+
+There is one per number of looks at the sky (`group_of`); they differ in nothing else.
 
 What to link to its inputs
 --------------------------
@@ -18,6 +20,11 @@ Warp Map
 Disk
     The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. If it is not linked, there is
     no disk.
+Sky Levels
+    An Image node with `physics.sky_levels(...).atlas()` of the same sky, scene-linear. If it is not linked, the sky is
+    not filtered.
+Footprint
+    An Image node with the baked EXR beside the warp map's, set like that. If it is not linked, the sky is not filtered.
 Environment Rotation, Environment Strength
     The values of the World's Mapping node (type Point) and of its Background node.
 
@@ -27,18 +34,22 @@ cannot hold texture coordinates. In background it must work on the CPU (`composi
 
 from __future__ import annotations
 
+from functools import cache, partial
+from typing import Any
+
 import bpy
 
 from ..core.physics_api import physics
-from . import black_hole_nodes
+from . import black_hole_nodes, filtered_sky
 from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 3
+GROUP_VERSION = 4
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
+"""Key of the group that does not filter; for the others the number of looks is appended."""
 
 RENDER = SocketSpec(
     "Render",
@@ -84,6 +95,20 @@ DISK = SocketSpec(
     default=(0.0, 0.0, 0.0, 0.0),
     hide_value=True,
 )
+LEVELS = SocketSpec(
+    "Sky Levels",
+    "NodeSocketColor",
+    "The sky at ever coarser resolution, made by the add-on, by which it is filtered",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
+FOOTPRINT = SocketSpec(
+    "Footprint",
+    "NodeSocketColor",
+    "The baked sizes of the pixels on the sky (Non-Color), over which it is averaged",
+    default=(0.0, 0.0, 0.0, 0.0),
+    hide_value=True,
+)
 IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
 SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole, its disk and the sky without the scene", in_out="OUTPUT")
 SHADOW = SocketSpec(
@@ -107,11 +132,13 @@ INPUTS = (
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
     DISK,
+    LEVELS,
+    FOOTPRINT,
 )
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
-def _build(builder: TreeBuilder, values: Values) -> Values:
+def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
     inputs = black_hole_nodes.GroupInputs(
         render=values[RENDER.name],
         environment=values[ENVIRONMENT.name],
@@ -123,8 +150,10 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
         redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
         temperature=values[TEMPERATURE.name],
         disk=values[DISK.name],
+        levels=values[LEVELS.name],
+        footprint=values[FOOTPRINT.name],
     )
-    results = black_hole_nodes.build(builder, inputs)
+    results = black_hole_nodes.build(builder, inputs, looks)
     return {
         IMAGE.name: results.image,
         SKY.name: results.sky,
@@ -133,13 +162,96 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
     }
 
 
-_GROUP = VersionedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, _build)
+@cache
+def group_of(looks: int) -> VersionedGroup:
+    """Return the kind of group for a number of looks at the sky per pixel; 0 does not filter.
 
-is_group = _GROUP.owns
-is_current = _GROUP.is_current
-find_group = _GROUP.find
-ensure_group = _GROUP.ensure
-add_group_node = _GROUP.add_node
+    The compositor evaluates all nodes of a group, needed or not: hence one group per number.
+    """
+    name = f"{GROUP_NAME} {looks}" if looks else GROUP_NAME
+    key = f"{VERSION_KEY}_{looks}" if looks else VERSION_KEY
+    return VersionedGroup(name, GROUP_VERSION, key, INPUTS, OUTPUTS, partial(_build, looks))
+
+
+_KINDS = tuple(group_of(choice.value) for choice in physics.SKY_FILTER.choices)
+
+
+def kind_of(tree: bpy.types.NodeTree | None) -> VersionedGroup | None:
+    """Return which kind of the group a node tree is, whatever its version and state."""
+    return next((kind for kind in _KINDS if kind.owns(tree)), None)
+
+
+def is_group(tree: bpy.types.NodeTree | None) -> bool:
+    """Whether a node tree is one of these groups, whatever its version and state."""
+    return kind_of(tree) is not None
+
+
+def is_current(tree: bpy.types.NodeTree) -> bool:
+    """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
+    kind = kind_of(tree)
+    inner = filtered_sky.LOOK.find()
+    whole = kind == group_of(0) or (inner is not None and filtered_sky.LOOK.is_current(inner))
+    return kind is not None and kind.is_current(tree) and whole
+
+
+def ensure_group(looks: int = 0) -> bpy.types.NodeTree:
+    """Return the group for a number of looks, and build it and the group inside it if they are not current."""
+    if looks:
+        filtered_sky.LOOK.ensure()
+    return group_of(looks).ensure()
+
+
+def add_group_node(tree: bpy.types.NodeTree, looks: int = 0) -> bpy.types.Node:
+    """Add a group node to a compositor tree."""
+    ensure_group(looks)
+    return group_of(looks).add_node(tree)
+
+
+def use(node: bpy.types.Node, looks: int) -> None:
+    """Let a group node use the group for a number of looks; what is linked to it and set on it stays.
+
+    Parameters
+    ----------
+    node : bpy.types.Node
+        A group node.
+    looks : int
+        0 or one of the choices of `physics.SKY_FILTER`.
+    """
+    group = ensure_group(looks)
+    if node.node_tree == group:
+        return
+    former = node.node_tree
+    kind = kind_of(former)
+    if former is not None and kind is not None and former.library is None:
+        kind.ensure(former)  # now its inputs are those of the other group
+    links = node.id_data.links
+    values = {socket.name: _copied(socket.default_value) for socket in node.inputs}
+    origins = {socket.name: socket.links[0].from_socket for socket in node.inputs if socket.is_linked}
+    targets = {socket.name: [link.to_socket for link in socket.links] for socket in node.outputs}
+    for link in [link for socket in (*node.inputs, *node.outputs) for link in socket.links]:
+        links.remove(link)  # kept, they would go by the order of the sockets
+    node.node_tree = group
+    for socket in node.inputs:
+        if socket.name in values:
+            socket.default_value = values[socket.name]
+        if socket.name in origins:
+            links.new(origins[socket.name], socket)
+    for socket in node.outputs:
+        for target in targets.get(socket.name, ()):
+            links.new(socket, target)
+    remove_unused()
+
+
+def _copied(value: Any) -> Any:
+    return value if isinstance(value, float | int | str) else tuple(value)
+
+
+def remove_unused() -> None:
+    """Remove the groups that nothing uses, then the one that was used only inside them."""
+    for is_ours in (is_group, filtered_sky.LOOK.owns):
+        for tree in list(bpy.data.node_groups):
+            if tree.users == 0 and tree.library is None and is_ours(tree):
+                bpy.data.node_groups.remove(tree)
 
 
 def group_nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from ..core.physics_api import physics
 from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_integer, sin, sqrt, where
 from .builder import Float, TreeBuilder, Vector
+from .filtered_sky import filtered
 from .image_lookup import sample_bilinearly
 from .image_nodes import separate_color
 from .redshift import redshift_gain
@@ -40,6 +41,8 @@ class GroupInputs:
     redshift_brightness: Float
     temperature: Float
     disk: Vector
+    levels: Vector
+    footprint: Vector
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class _Angle:
     rest: Float
 
 
-def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
+def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs:
     """Add all nodes between the group's inputs and its outputs.
 
     Parameters
@@ -80,6 +83,8 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
         Of a compositor tree in which there is only the Group Input node.
     inputs : GroupInputs
         That node's values.
+    looks : int
+        Looks at the sky per pixel, along its footprint; 0: one, unfiltered.
 
     Returns
     -------
@@ -92,6 +97,10 @@ def build(builder: TreeBuilder, inputs: GroupInputs) -> GroupOutputs:
         u, v = _texture_coordinates(channels, inputs.rotation)
     with builder.frame("Environment"):
         environment = sample_bilinearly(inputs.environment, u, v)
+    if looks:
+        with builder.frame("Filtered sky"):
+            direction = _direction(channels).rotated(inputs.rotation)
+            environment = filtered(environment, inputs.levels, inputs.footprint, direction, inputs.rotation, looks)
     with builder.frame("Redshift"):
         gain = redshift_gain(channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
     with builder.frame("Sky"):
@@ -131,6 +140,11 @@ def _read_map(warp_map: Vector) -> _MapChannels:
     )
 
 
+def _direction(channels: _MapChannels) -> Vector:
+    sine = sin(channels.theta)
+    return combine(sine * cos(channels.phi), sine * sin(channels.phi), cos(channels.theta))
+
+
 def _texture_coordinates(channels: _MapChannels, rotation: Vector) -> tuple[Float, Float]:
     """Texture coordinates of the rotated direction: u within -0.6..0.6 (it repeats), v in 0..1 from below.
 
@@ -140,9 +154,7 @@ def _texture_coordinates(channels: _MapChannels, rotation: Vector) -> tuple[Floa
     angle_x, angle_y, angle_z = rotation.separate()
     tilted = (abs(angle_x) + abs(angle_y)).greater_than(0.0).labeled("Tilted?")
 
-    sine = sin(channels.theta)
-    direction = combine(sine * cos(channels.phi), sine * sin(channels.phi), cos(channels.theta))
-    x, y, z = direction.rotated(combine(angle_x, angle_y, 0.0)).separate()
+    x, y, z = _direction(channels).rotated(combine(angle_x, angle_y, 0.0)).separate()
     tilted_longitude = atan2(y, x)
     # By arc tangent, since the arc sine of z loses half of the digits at the poles.
     tilted_polar = atan2(sqrt(multiply_add(x, x, y * y)), z)

@@ -52,6 +52,7 @@ class TreeBuilder:
         self._frame: bpy.types.Node | None = None
         self._next_x = 0.0
         self._count_in_frame = 0
+        self._places: dict[str, tuple[float, float]] = {}
 
     @contextmanager
     def frame(self, label: str) -> Iterator[None]:
@@ -79,9 +80,15 @@ class TreeBuilder:
         column, row = divmod(self._count_in_frame, _NODES_IN_A_COLUMN)
         if self._frame is not None:
             node.parent = self._frame
-        node.location = (self._next_x + column * _COLUMN_WIDTH, -row * _ROW_HEIGHT)
+        self._places[node.name] = (self._next_x + column * _COLUMN_WIDTH, -row * _ROW_HEIGHT)
         self._count_in_frame += 1
         return node
+
+    def arrange(self) -> None:
+        """Put the nodes that were added to their places, all at once: Blender updates a tree after each single one."""
+        nodes = self.tree.nodes
+        places = [self._places.get(node.name, tuple(node.location)) for node in nodes]
+        nodes.foreach_set("location", [number for place in places for number in place])
 
     def value(self, socket: Socket) -> Float | Vector:
         """Wrap an output socket: a float as `Float`, a vector or a color as `Vector`."""

@@ -133,6 +133,7 @@ class VersionedGroup:
         targets = {socket.name: socket for socket in builder.node("NodeGroupOutput").inputs}
         for spec in self.outputs:
             builder.feed(targets[spec.name], results[spec.name])
+        builder.arrange()
         tree[self.version_key] = self.version
         tree[BLENDER_KEY] = SERIES
         tree[CONTENT_KEY] = _fingerprint(tree)

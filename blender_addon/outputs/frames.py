@@ -103,8 +103,11 @@ def bake(
 
 
 def _bake(uid: int, frames: list[int], requests: baking.RequestsAt) -> Generator[baking.Progress, None, baking.Summary]:
+    scene = scene_of(uid)
     try:
         summary = yield from baking.bake_frames(frames, requests)
+        if scene is not None:
+            registry.of(scene).prepare_files(scene, may_bake=True)
     except physics.BlackHoleError:
         _show_baked(uid)  # those of the other frames
         raise

@@ -158,6 +158,15 @@ class Output(ABC):
     def begin_render(self, scene: bpy.types.Scene) -> None:
         """Prepare the scene for a render of one frame or many."""
 
+    def prepare_files(self, scene: bpy.types.Scene, *, may_bake: bool) -> None:
+        """Make the files that all frames share, unless they are there.
+
+        Raises
+        ------
+        physics.BlackHoleError
+            If they are not there and cannot, or may not, be made.
+        """
+
     @abstractmethod
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Show no map: the picture is magenta or black until `point_at` has seen to the frame."""

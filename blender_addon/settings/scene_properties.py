@@ -209,6 +209,9 @@ for _name in SKY_PROPERTIES:
     UmbraSceneProperties.__annotations__[_name] = property_of(
         physics.SKY_SETTINGS[_name], lambda settings, _context: _refresh(settings)
     )
+UmbraSceneProperties.__annotations__["sky_filter"] = property_of(
+    physics.SKY_FILTER, lambda settings, _context: _refresh(settings)
+)
 saved_names.accept(UmbraSceneProperties, saved_names.SCENE)
 
 
@@ -222,6 +225,11 @@ def _output_changed(settings: UmbraSceneProperties) -> None:
 
 def _preview_changed(settings: UmbraSceneProperties) -> None:
     changes.notify(Change.PREVIEW, settings.id_data)
+
+
+def looks_of(settings: SceneSettings) -> int:
+    """The number of looks at the sky per pixel, from the chosen filter; 0 where it is not filtered."""
+    return int(next(each.value for each in physics.SKY_FILTER.choices if each.identifier == settings.sky_filter))
 
 
 def tolerances_of(settings: SceneSettings) -> tuple[float, float]:

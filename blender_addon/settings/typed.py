@@ -55,6 +55,7 @@ class SceneSettings(_Group):
     redshift_color: float
     redshift_brightness: float
     sky_temperature: float
+    sky_filter: str
     live_preview: bool
     foreground: bpy.types.Collection | None
     foreground_scene: bpy.types.Scene | None

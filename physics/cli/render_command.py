@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..images.exr import replacing, write_exr
 from ..images.picture import read_picture
 from ..images.png import write_png
 from ..light.color import redshift_gain
-from ..light.sky_settings import RENDER_ARGUMENTS, SKY_SETTINGS
+from ..light.sky_settings import RENDER_ARGUMENTS, SKY_FILTER, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
 from ..reference.reference_render import render
 from . import disk_options
@@ -45,10 +46,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--redshift-colour", dest="redshift_color", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS
     )
+    parser.add_argument(
+        SKY_FILTER.option,
+        choices=[each.identifier.lower() for each in SKY_FILTER.choices],
+        default=SKY_FILTER.identifier(int(SKY_FILTER.default)).lower(),
+        help=SKY_FILTER.description,
+    )
     disk_options.add_render_options(parser)
 
 
-def sky_arguments(options: argparse.Namespace) -> dict[str, float]:
+def sky_arguments(options: argparse.Namespace) -> dict[str, Any]:
     """Return how the sky looks by the options, as arguments of `reference_render.render`."""
     values = {name: getattr(options, row.option[2:].replace("-", "_")) for name, row in SKY_SETTINGS.items()}
     return {RENDER_ARGUMENTS[name]: value for name, value in values.items()}
@@ -90,6 +97,7 @@ def run(options: argparse.Namespace) -> None:
         rotation=[math.radians(angle) for angle in options.rotation],
         **sky_arguments(options),
         output_size=(camera["width"], camera["height"]),
+        looks=next(int(each.value) for each in SKY_FILTER.choices if each.identifier == options.filter.upper()),
     )
     image = disk_options.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
     with replacing(options.output) as temporary:

@@ -13,12 +13,12 @@ from pathlib import Path
 from ..images.exr import PathLike
 from ..maps.warp_map import WarpMap
 from ..shot.map_parameters import WarpMapParameters
-from . import disk_pass_file
+from . import disk_pass_file, footprint_file
 from .companion import Companion
 from .map_file import MapFormat
 from .warp_map_file import write_warp_map
 
-COMPANIONS: tuple[Companion, ...] = (disk_pass_file.COMPANION,)
+COMPANIONS: tuple[Companion, ...] = (disk_pass_file.COMPANION, footprint_file.COMPANION)
 
 COMPANION_MARKS = "|".join(each.mark for each in COMPANIONS)
 """Regular expression of what stands before the frame's number in the names of such files."""

@@ -8,7 +8,7 @@ table in the manual (`docs/settings_tables.py`) are made from it.
 from __future__ import annotations
 
 from .color import DEFAULT_TEMPERATURE
-from .settings import Setting
+from .settings import Choice, Setting
 
 SKY_SETTINGS: dict[str, Setting] = {
     "exposure": Setting(
@@ -65,3 +65,16 @@ RENDER_ARGUMENTS = {
     "sky_temperature": "temperature",
 }
 """Name in `SKY_SETTINGS` -> argument of `reference_render.render`."""
+
+SKY_FILTER = Setting(
+    "Filter",
+    "How the sky is averaged over the part of it that each pixel sees",
+    8,
+    option="--filter",
+    choices=(
+        Choice(0, "OFF", 0, "Off", "One look at the sky per pixel: beside the shadow it flickers", 0.0),
+        Choice(8, "FAST", 1, "Fast", "Eight looks per pixel, along the ellipse that it sees of the sky", 8.0),
+        Choice(16, "BEST", 2, "Best", "Sixteen looks per pixel: sharper beside the shadow", 16.0),
+    ),
+)
+"""The values are numbers of looks; see `reference.filtered_sky`."""

@@ -15,9 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..light.color import DEFAULT_TEMPERATURE, redshift_gain
+from ..light.sky_levels import sky_levels
+from ..maps.footprint import footprint
 from ..numerics.checks import finite, three
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import unit_vectors
+from .environment_lookup import sample_environment
+from .filtered_sky import sample_filtered
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -106,43 +110,6 @@ def rotation_matrix(euler: ArrayLike) -> FloatArray:
     return matrix
 
 
-def sample_environment(environment: ArrayLike, directions: ArrayLike) -> FloatArray:
-    """Bilinear look-up of an equirectangular picture, in the convention of Blender's World.
-
-    Parameters
-    ----------
-    environment : array_like, shape (rows, columns, channels)
-        Row 0 at the top (the zenith, +z), the middle column towards +x. Texel centers at (i + 0.5) / N.
-    directions : array_like, shape (..., 3)
-        Directions to look along; they need not be of unit length.
-
-    Returns
-    -------
-    ndarray, shape (..., channels)
-        u = 0.5 - atan2(y, x) / (2 pi) wraps round; v = 0.5 + asin(z) / pi ends at the poles, where the first
-        and last row are extended.
-    """
-    picture: FloatArray = np.asarray(environment, dtype=np.float64)
-    looking: FloatArray = np.asarray(directions, dtype=np.float64)
-    rows, columns = picture.shape[:2]
-    x, y, z = looking[..., 0], looking[..., 1], looking[..., 2]
-    u = 0.5 - np.arctan2(y, x) / (2.0 * np.pi)
-    # By atan2: equal to pi/2 - asin(z), but it keeps its digits at the poles, where asin loses half of them.
-    polar = np.arctan2(np.hypot(x, y), z)
-    column = u * columns - 0.5
-    row = polar / np.pi * rows - 0.5
-    left, top = np.floor(column), np.floor(row)
-    share_x, share_y = (column - left)[..., np.newaxis], (row - top)[..., np.newaxis]
-    left_index = left.astype(np.int64) % columns
-    right_index = (left_index + 1) % columns
-    top_index = np.clip(top.astype(np.int64), 0, rows - 1)
-    bottom_index = np.clip(top.astype(np.int64) + 1, 0, rows - 1)
-    upper = picture[top_index, left_index] * (1.0 - share_x) + picture[top_index, right_index] * share_x
-    lower = picture[bottom_index, left_index] * (1.0 - share_x) + picture[bottom_index, right_index] * share_x
-    colors: FloatArray = upper * (1.0 - share_y) + lower * share_y
-    return colors
-
-
 def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:
     """Return which pixels no valid warp map can have.
 
@@ -201,6 +168,7 @@ def render(
     strength: float = 1.0,
     foreground: ArrayLike | None = None,
     output_size: tuple[int, int] | None = None,
+    looks: int = 0,
 ) -> ReferencePicture:
     """Picture of a sky seen through a warp map, with an optional foreground in front of it.
 
@@ -224,6 +192,9 @@ def render(
         Premultiplied RGBA of the final size, row 0 at the top. Pixels of alpha 0 may carry light (flames).
     output_size : (int, int), optional
         Width and height of the picture. Default: the foreground's, or else the map's.
+    looks : int
+        Places at which each pixel looks at the sky along the ellipse that it covers there; see
+        `filtered_sky.sample_filtered` and `SKY_FILTERS`. 0: one look at the sky itself, unfiltered.
 
     Returns
     -------
@@ -271,7 +242,15 @@ def render(
     shift = np.where(invalid, 1.0, one_plus_z)
     seen = np.where(invalid, 1.0, visibility)
     directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
-    colors = sample_environment(sky_picture[..., :3], directions @ rotation_matrix(rotation).T)
+    turn = rotation_matrix(rotation)
+    if looks:
+        covered = footprint(warp_map).astype(np.float64)
+        covered[..., :3] = covered[..., :3] @ turn.T
+        covered[invalid] = 0.0
+        levels = sky_levels(sky_picture[..., :3])
+        colors = sample_filtered(sky_picture[..., :3], levels, directions @ turn.T, covered, looks)
+    else:
+        colors = sample_environment(sky_picture[..., :3], directions @ turn.T)
     colors *= redshift_gain(shift, color_amount, brightness_amount, temperature)
     colors *= (2.0**stops * strength * seen)[..., np.newaxis]
     colors[invalid] = MAGENTA

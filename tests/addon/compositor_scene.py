@@ -164,11 +164,21 @@ class GroupRenderer:
         output: str = "Image",
         percentage: int = 100,
         values: Mapping[str, object] | None = None,
+        looks: int = 0,
+        levels: FloatArray | None = None,
+        footprint: FloatArray | None = None,
     ) -> FloatArray:
         scene = empty_scene(*size, percentage)
         tree, target = compositor_tree(scene)
-        node = self.node_group.add_group_node(tree)
-        for name, pixels in (("Warp Map", warp_map), ("Environment", environment), ("Render", foreground)):
+        node = self.node_group.add_group_node(tree, looks)
+        pictures = {
+            "Warp Map": warp_map,
+            "Environment": environment,
+            "Render": foreground,
+            "Sky Levels": levels,
+            "Footprint": footprint,
+        }
+        for name, pixels in pictures.items():
             if pixels is not None:
                 source = image_node(tree, write_exr(self.folder / f"{name}.exr", pixels))
                 tree.links.new(source.outputs["Image"], node.inputs[name])

@@ -11,6 +11,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
+from ...settings.scene_properties import looks_of
 from ..shared import disk_sync
 from ..shared.compositor_tree import (
     GROUP,
@@ -36,6 +37,7 @@ from ..shared.tree_editing import (
     output_node,
     remove_tree,
 )
+from . import sky_filter
 from .compositor_sync import refresh
 
 BEFORE = "umbra_before"
@@ -103,8 +105,7 @@ def set_up(scene: bpy.types.Scene) -> list[str]:
         group = tree.nodes.new("CompositorNodeGroup")
         group[ROLE] = GROUP
         group.width = 220
-    if group.node_tree is None or group.node_tree != black_hole_group.ensure_group():
-        group.node_tree = black_hole_group.ensure_group()
+    black_hole_group.use(group, looks_of(scene.umbra))
     group.name = group.label = black_hole_group.GROUP_NAME
     _insert(scene, tree, group, notes)
     refresh(scene, notes)
@@ -221,16 +222,15 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     setup = find_setup(scene)
     if setup is not None:
         disk_sync.remove(tree)
+        sky_filter.remove(tree)
     for group in find_nodes(tree, GROUP):
         give_back(tree, group, "Render")
         prefix = group.path_from_id() + "."
         if tree.animation_data is not None:
             for curve in [each for each in tree.animation_data.drivers if each.data_path.startswith(prefix)]:
                 tree.animation_data.drivers.remove(curve)
-        inner = group.node_tree
         tree.nodes.remove(group)
-        if inner is not None and inner.users == 0 and black_hole_group.is_group(inner):
-            bpy.data.node_groups.remove(inner)
+    black_hole_group.remove_unused()
     maps, skies = find_nodes(tree, MAP), find_nodes(tree, SKY)
     images = {node.image for node in maps if node.image is not None}
     for node in maps + skies:

@@ -12,10 +12,11 @@ from ...core.errors import SceneError
 from ...nodes import black_hole_group
 from ...scene import environment, frame_setup, sky_frames
 from ...scene.node_paths import Place
+from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
-from ..shared.compositor_tree import Setup, find_setup, find_tree
+from ..shared.compositor_tree import Setup, find_setup, find_tree, takes_sky_from_settings
 from ..shared.map_images import NO_MAP, plain_map, read_sequence
-from . import disk
+from . import disk, sky_filter
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
 
@@ -34,13 +35,14 @@ def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
     inputs, outputs = setup.group.inputs, setup.group.outputs
     whole = all(spec.name in inputs for spec in black_hole_group.INPUTS)
     whole = whole and all(spec.name in outputs for spec in black_hole_group.OUTPUTS)
-    if tree is None or not black_hole_group.is_group(tree):
+    looks = looks_of(scene.umbra)
+    if black_hole_group.kind_of(tree) != black_hole_group.group_of(looks):
         whole = False
-    elif whole and thorough:
+    elif whole and thorough and tree is not None:
         whole = black_hole_group.is_current(tree)
     if whole:
         return False
-    setup.group.node_tree = black_hole_group.ensure_group()
+    black_hole_group.use(setup.group, looks)
     return True
 
 
@@ -50,6 +52,8 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     if setup is None:
         return
     repair(scene, thorough=False)
+    if setup.tree.library is None:
+        sky_filter.ensure_nodes(setup)
     disk_light.refresh(scene, frame_setup.find_active_hole(scene))
     disk.refresh(scene)
     try:
@@ -95,6 +99,7 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
         return
     read_sequence(setup.map, MAP_IMAGE_NAME, path)
     disk_sync.point_passes(setup.tree, path)
+    sky_filter.point_at_footprints(setup.tree, path)
 
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:
@@ -103,19 +108,11 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
     if setup is not None and setup.map is not None and setup.map.image is not None:
         setup.map.image.reload()
     tree = find_tree(scene)
+    if tree is not None:
+        sky_filter.forget_loaded(tree)
     for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
         if node.image is not None:
             node.image.reload()
-
-
-def takes_sky_from_settings(setup: Setup) -> bool:
-    """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
-    socket = setup.group.inputs.get("Environment")
-    if socket is None or setup.sky is None:
-        return False
-    if not socket.is_linked and setup.sky.image is not None and setup.sky.image.type == "MULTILAYER":
-        return True  # Blender 4.5 drops the links of a file of layers while that is missing
-    return any(link.from_node == setup.sky for link in socket.links)
 
 
 def sync_sky(scene: bpy.types.Scene) -> None:
@@ -144,6 +141,7 @@ def sync_sky(scene: bpy.types.Scene) -> None:
         elif is_new or node.frame_duration <= 1:  # else they are the artist's own
             sky_frames.set_defaults(sky.image, node)
     environment.check_image(sky.image)
+    sky_filter.sync(scene, setup, sky.image)
     from_world = scene.umbra.environment_source == "WORLD"
     _follow(scene, setup, ROTATION_SOCKET, sky.rotation_at, sky.rotation, fixed=from_world)
     _follow(scene, setup, STRENGTH_SOCKET, sky.strength_at, sky.strength, fixed=from_world)
@@ -170,6 +168,8 @@ def check_frame(scene: bpy.types.Scene) -> None:
     setup = find_setup(scene)
     if setup is not None and setup.sky is not None and setup.sky.image is not None and takes_sky_from_settings(setup):
         sky_frames.check_frame(setup.sky.image, scene.frame_current, setup.sky)
+        if sky_frames.moves(setup.sky.image):
+            sky_filter.ensure_files(scene, setup, may_bake=scene.umbra.auto_bake)
 
 
 def _follow(

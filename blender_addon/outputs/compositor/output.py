@@ -11,14 +11,22 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment, panorama
+from ...scene import environment, panorama, sky_frames
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
-from ..shared.compositor_tree import check_linked, check_rendered, check_unmuted, find_setup, find_tree, is_in_use
+from ..shared.compositor_tree import (
+    check_linked,
+    check_rendered,
+    check_unmuted,
+    find_setup,
+    find_tree,
+    is_in_use,
+    takes_sky_from_settings,
+)
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, disk, panel
+from . import compositing, compositor_sync, disk, panel, sky_filter
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
 
@@ -174,6 +182,13 @@ class CompositorOutput(Output):
             )
         check_linked(scene)
         compositor_sync.sync_sky(scene)
+        self.prepare_files(scene, may_bake=scene.umbra.auto_bake)
+
+    def prepare_files(self, scene: bpy.types.Scene, *, may_bake: bool) -> None:
+        """Make the levels of the sky."""
+        setup = find_setup(scene)
+        if setup is not None and setup.sky is not None and not sky_frames.moves_at(setup.sky):
+            sky_filter.ensure_files(scene, setup, may_bake=may_bake)
 
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the group read no map, and refuse a compositor that could not show one."""
@@ -234,15 +249,16 @@ class CompositorOutput(Output):
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
         """Say where the compositor is not set up."""
-        if find_setup(scene) is not None:
-            left_out = environment.world_left_out(scene)
-            return [] if left_out is None else [Notice(left_out)]
+        setup = find_setup(scene)
+        if setup is not None:
+            said = (environment.world_left_out(scene), sky_filter.notice(scene, setup))
+            return [Notice(text) for text in said if text is not None]
         return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
         """Return why the sky cannot be read, unless it is the artist's own nodes."""
         setup = find_setup(scene)
-        if setup is not None and not compositor_sync.takes_sky_from_settings(setup):
+        if setup is not None and not takes_sky_from_settings(setup):
             return None
         try:
             environment.check_image(environment.read(scene).image)

@@ -22,6 +22,7 @@ def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene, problem: str | None
         layout.operator("umbra.use_star_sky", icon="OUTLINER_OB_LIGHT")
     if problem is not None:
         draw_problem(layout, problem)
+    layout.prop(settings, "sky_filter", text="Filter")
     layout.use_property_split = False  # the names are too long to stand beside their fields
     column = layout.column()
     column.active = settings.environment_source == "IMAGE"

@@ -11,8 +11,9 @@ from ...core.errors import SceneError
 # The node's custom property that says what it is for, and its values.
 ROLE = "umbra_role"
 GROUP, MAP, SKY, RENDER_LAYER, OUTPUT = "group", "map", "sky", "render_layer", "output"
+FOOTPRINT, LEVELS = "footprint", "levels"
 # What a node of a role is: one of another type was given the role by hand.
-TYPES = {GROUP: "GROUP", MAP: "IMAGE", SKY: "IMAGE", RENDER_LAYER: "R_LAYERS"}
+TYPES = {GROUP: "GROUP", MAP: "IMAGE", SKY: "IMAGE", FOOTPRINT: "IMAGE", LEVELS: "IMAGE", RENDER_LAYER: "R_LAYERS"}
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,16 @@ def find_setup(scene: bpy.types.Scene) -> Setup | None:
     if group is None:
         return None
     return Setup(tree, group, find_node(tree, MAP), find_node(tree, SKY))
+
+
+def takes_sky_from_settings(setup: Setup) -> bool:
+    """Whether the sky comes from the add-on's own image node, and not from nodes of the artist's."""
+    socket = setup.group.inputs.get("Environment")
+    if socket is None or setup.sky is None:
+        return False
+    if not socket.is_linked and setup.sky.image is not None and setup.sky.image.type == "MULTILAYER":
+        return True  # Blender 4.5 drops the links of a file of layers while that is missing
+    return any(link.from_node == setup.sky for link in socket.links)
 
 
 def is_in_use(scene: bpy.types.Scene) -> bool:
