@@ -59,6 +59,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="error of direction between traced rays, radians; 0 traces every pixel",
     )
     parser.add_argument("--method", choices=tuple(METHODS), default=DEFAULT_METHOD, help="how rays are traced")
+    parser.add_argument(
+        "--footprint",
+        action="store_true",
+        help="write the sizes of the pixels on the sky as well, by which Blender's compositor filters it",
+    )
     disk_options.add_bake_options(parser)
 
 
@@ -106,7 +111,7 @@ def run(options: argparse.Namespace) -> None:
         disk=disk_options.disk_of(options),
     )
     parameters.validate()
-    beside = dict(files_beside(options.output, parameters))
+    beside = dict(files_beside(options.output, parameters, optional=options.footprint))
     check_maps({options.output: warp_map_file.FORMAT, **beside})
     warning = unstable_orbit_warning(parameters)
     if warning:
@@ -115,7 +120,12 @@ def run(options: argparse.Namespace) -> None:
     warp_map = bake(parameters, progress=ProgressPrinter())
     with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
         map_file = together.enter_context(replacing(options.output))
-        write_companions(options.output, warp_map, lambda path: together.enter_context(replacing(path)))
+        write_companions(
+            options.output,
+            warp_map,
+            lambda path: together.enter_context(replacing(path)),
+            optional=options.footprint,
+        )
         write_warp_map(map_file, warp_map)
         say("\n".join(_summary(options.output, list(beside), warp_map, time.perf_counter() - started)))
     lost, unresolved = warp_map.counts.get("disk_unresolved", 0), warp_map.counts["unresolved"]

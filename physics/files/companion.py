@@ -26,3 +26,5 @@ class Companion:
     """Returns where the files of a map lie, none if it has none, for the map's path and what it is made from."""
     write: Callable[[PathLike, WarpMap, int], None]
     """Writes one of them: to a path, from what was baked, the number among `paths`."""
+    is_optional: bool = False
+    """Whether it can be made from the map alone, at any time."""

@@ -24,7 +24,9 @@ COMPANION_MARKS = "|".join(each.mark for each in COMPANIONS)
 """Regular expression of what stands before the frame's number in the names of such files."""
 
 
-def files_beside(map_path: PathLike, parameters: WarpMapParameters) -> tuple[tuple[Path, MapFormat], ...]:
+def files_beside(
+    map_path: PathLike, parameters: WarpMapParameters, *, optional: bool = True
+) -> tuple[tuple[Path, MapFormat], ...]:
     """Return the files that lie beside a warp map, and their formats.
 
     Parameters
@@ -33,11 +35,16 @@ def files_beside(map_path: PathLike, parameters: WarpMapParameters) -> tuple[tup
         The map's.
     parameters : WarpMapParameters
         What it is made from.
+    optional : bool
+        Whether those count that can be made from the map at any time.
     """
-    return tuple((path, each.format) for each in COMPANIONS for path in each.paths(map_path, parameters))
+    kinds = [each for each in COMPANIONS if optional or not each.is_optional]
+    return tuple((path, each.format) for each in kinds for path in each.paths(map_path, parameters))
 
 
-def write_companions(map_path: PathLike, warp_map: WarpMap, place: Callable[[Path], Path] = Path) -> None:
+def write_companions(
+    map_path: PathLike, warp_map: WarpMap, place: Callable[[Path], Path] = Path, *, optional: bool = True
+) -> None:
     """Write the files beside a warp map.
 
     Parameters
@@ -48,6 +55,8 @@ def write_companions(map_path: PathLike, warp_map: WarpMap, place: Callable[[Pat
         What was baked.
     place : callable, optional
         Returns where to write the file of a path; by default there.
+    optional : bool
+        Whether to write those that can be made from the map at any time.
 
     Raises
     ------
@@ -56,6 +65,8 @@ def write_companions(map_path: PathLike, warp_map: WarpMap, place: Callable[[Pat
     """
     parameters = WarpMapParameters.from_metadata(warp_map.metadata["parameters"])
     for each in COMPANIONS:
+        if each.is_optional and not optional:
+            continue
         for number, path in enumerate(each.paths(map_path, parameters)):
             each.write(place(path), warp_map, number)
 

@@ -99,4 +99,4 @@ def _write(path: PathLike, warp_map: WarpMap, _number: int) -> None:
     write_footprint(path, warp_map)
 
 
-COMPANION = Companion(FORMAT, read_footprint, "footprint", _paths, _write)
+COMPANION = Companion(FORMAT, read_footprint, "footprint", _paths, _write, is_optional=True)

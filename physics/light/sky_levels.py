@@ -140,12 +140,12 @@ def sky_levels(picture: ArrayLike) -> SkyLevels:
     -----
     The mean light of the whole sphere, by solid angle, is the same at each level, to single precision.
     """
-    texels = np.asarray(picture, dtype=np.float32)
+    texels = np.array(picture, dtype=np.float32)
     if texels.ndim != 3 or 0 in texels.shape:
         raise BlackHoleError(
             f"The environment has shape {texels.shape}, expected (rows, columns, channels).", code="settings.array"
         )
-    texels = np.nan_to_num(texels, nan=0.0, posinf=LARGEST_HALF, neginf=0.0)
+    np.nan_to_num(texels, copy=False, nan=0.0, posinf=LARGEST_HALF, neginf=0.0)
     layout = layout_for(*texels.shape[:2])
     texels = _resampled(texels, layout.rows, axis=0, around=False)
     texels = _resampled(texels, 2 * layout.rows, axis=1, around=True)
