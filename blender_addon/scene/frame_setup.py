@@ -19,7 +19,7 @@ from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
-from . import drivers, rotations
+from . import drivers, instanced_hole, rotations
 from .camera_type import original_type
 from .enabled import is_enabled
 from .rotations import Matrix, Vector
@@ -101,11 +101,13 @@ def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
     Raises
     ------
     SceneError
-        There is none, or it was deleted, or there are several and none is chosen.
+        There is none, or it was deleted, or is in a collection instance, or there are several and none is chosen.
     """
     hole = find_active_hole(scene)
     if hole is not None:
         return hole
+    if not holes(scene):
+        instanced_hole.check(scene)
     chosen = scene.umbra.active_hole
     if chosen is not None:
         raise SceneError(

@@ -3,13 +3,14 @@
 
 import bpy
 
+from ..core.physics_api import physics
 from ..outputs import registry, switching
 from ..outputs.compositor.output import CompositorOutput
 from ..outputs.lens import foreground
 from ..scene import environment, frame_setup
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
-from .reporting import only_one_is_rendered, report_notes, reporting
+from .reporting import only_one_is_rendered, report_missing_camera, report_notes, reporting, reporting_sky
 
 HOLE_NAME = "Black Hole"
 
@@ -51,24 +52,22 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         if hole.name not in context.view_layer.objects:  # that collection is excluded here
             context.collection.objects.unlink(hole)
             scene.collection.objects.link(hole)
+        former = scene.umbra.active_hole
+        scene.umbra.active_hole = hole
+        try:
+            with reporting_sky(self, scene):
+                report_notes(self, registry.of(scene).on_hole_added(scene))
+        except physics.BlackHoleError:  # which leaves the scene as it was
+            scene.umbra.active_hole = former
+            bpy.data.objects.remove(hole)
+            raise
         for each in context.selected_objects:
             each.select_set(False)
         hole.select_set(True)
         context.view_layer.objects.active = hole
-
-        settings = scene.umbra
-        settings.active_hole = hole
-        was_world = settings.environment_source == "WORLD"
-        report_notes(self, registry.of(scene).on_hole_added(scene))
-        image = settings.environment_image
-        has_changed = was_world and settings.environment_source == "IMAGE"
-        if has_changed and image is not None and environment.world_left_out(scene) is None:
-            why = "The scene has no World" if scene.world is None else f'World "{scene.world.name}" is a plain color'
-            self.report({"INFO"}, f'{why}: the sky is the image "{image.name}".')
         if len(frame_setup.holes(scene)) > 1:
             self.report({"WARNING"}, only_one_is_rendered(scene))
-        if scene.camera is None:
-            self.report({"WARNING"}, "The scene has no camera yet: add one to render the black hole.")
+        report_missing_camera(self, scene)
         return {"FINISHED"}
 
 
@@ -99,7 +98,11 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        report_notes(self, compositor().set_up(context.scene))
+        scene = context.scene
+        with reporting_sky(self, scene):
+            report_notes(self, compositor().set_up(scene))
+        if frame_setup.holes(scene):
+            report_missing_camera(self, scene)
         return {"FINISHED"}
 
 

@@ -42,7 +42,7 @@ class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         scene = context.scene
         hole = _hole(context)
-        if hole is None and scene.umbra.active_hole is None:
+        if hole is None and scene.umbra.active_hole is None and not frame_setup.holes(scene):
             layout.operator("umbra.add_black_hole", text="Add Black Hole", icon="ADD")
         else:
             layout.prop(scene.umbra, "active_hole")

@@ -11,7 +11,7 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment, panorama
+from ...scene import environment, frame_setup, instanced_hole, panorama
 from ...scene.frame_setup import FrameSetup
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
@@ -86,6 +86,8 @@ class CompositorOutput(Output):
     def set_up(self, scene: bpy.types.Scene) -> list[str]:
         """Put the black hole into the compositor, or bring it up to date there; return what the artist should know.
 
+        A hole that came from another file, where no set-up is yet, is shown like one that was added.
+
         Raises
         ------
         SceneError
@@ -95,6 +97,13 @@ class CompositorOutput(Output):
             raise SceneError(
                 "This scene's output is another one: choose Output: Compositor first.", code="compositor.other-output"
             )
+        has_holes = bool(frame_setup.holes(scene))
+        if not has_holes:
+            instanced_hole.check(scene)
+        if has_holes and find_setup(scene) is None:
+            if scene.umbra.active_hole is None:
+                scene.umbra.active_hole = frame_setup.find_active_hole(scene)
+            return self.on_hole_added(scene)
         return _prepare(scene) + compositing.set_up(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
@@ -113,6 +122,9 @@ class CompositorOutput(Output):
 
     def on_hole_added(self, scene: bpy.types.Scene) -> list[str]:
         """Choose the star sky where the World has none that can be shown, and set the compositor up."""
+        tree = find_tree(scene)
+        if tree is not None:
+            check_shared(scene, tree)
         settings = scene.umbra
         stars = False
         notes: list[str] = []
