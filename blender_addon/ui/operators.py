@@ -10,7 +10,14 @@ from ..outputs.lens import foreground
 from ..scene import environment, frame_setup
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
-from .reporting import only_one_is_rendered, report_missing_camera, report_notes, reporting, reporting_sky
+from .reporting import (
+    only_one_is_rendered,
+    report_missing_camera,
+    report_notes,
+    reporting,
+    reporting_sky,
+    reporting_switches,
+)
 
 HOLE_NAME = "Black Hole"
 
@@ -55,7 +62,7 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         former = scene.umbra.active_hole
         scene.umbra.active_hole = hole
         try:
-            with reporting_sky(self, scene):
+            with reporting_switches(self, scene), reporting_sky(self, scene):
                 report_notes(self, registry.of(scene).on_hole_added(scene))
         except physics.BlackHoleError:  # which leaves the scene as it was
             scene.umbra.active_hole = former
@@ -99,7 +106,7 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        with reporting_sky(self, scene):
+        with reporting_switches(self, scene), reporting_sky(self, scene):
             report_notes(self, compositor().set_up(scene))
         if frame_setup.holes(scene):
             report_missing_camera(self, scene)
@@ -118,7 +125,8 @@ class UMBRA_OT_remove_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        compositor().take_out(context.scene)
+        with reporting_switches(self, context.scene):
+            compositor().take_out(context.scene)
         return {"FINISHED"}
 
 
@@ -150,9 +158,14 @@ class UMBRA_OT_set_output(bpy.types.Operator):
         default=1,
     )
 
+    @classmethod
+    def description(cls, _context: bpy.types.Context | None, properties: bpy.types.OperatorProperties | None) -> str:
+        return cls.bl_description if properties is None else registry.get(properties.output).description
+
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        report_notes(self, switching.switch(context.scene, self.output))
+        with reporting_switches(self, context.scene):
+            report_notes(self, switching.switch(context.scene, self.output))
         return {"FINISHED"}
 
 
@@ -171,7 +184,8 @@ class UMBRA_OT_foreground(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        added = foreground.set_up(context.scene, context.evaluated_depsgraph_get())
+        with reporting_switches(self, context.scene):
+            added = foreground.set_up(context.scene, context.evaluated_depsgraph_get())
         self.report({"INFO"}, f"In front of the hole: {', '.join(added) or 'nothing new'}.")
         return {"FINISHED"}
 
@@ -188,7 +202,8 @@ class UMBRA_OT_remove_foreground(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        foreground.remove(context.scene)
+        with reporting_switches(self, context.scene):
+            foreground.remove(context.scene)
         return {"FINISHED"}
 
 

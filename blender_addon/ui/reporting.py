@@ -9,6 +9,7 @@ from typing import TypeVar
 import bpy
 
 from ..core.physics_api import physics
+from ..outputs import switched
 from ..scene import environment, frame_setup
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
@@ -37,6 +38,16 @@ def report_notes(operator: bpy.types.Operator, notes: Iterable[str]) -> None:
     """Report what the artist should know."""
     for note in notes:
         operator.report({"WARNING"}, note)
+
+
+@contextmanager
+def reporting_switches(operator: bpy.types.Operator, scene: bpy.types.Scene) -> Iterator[None]:
+    """Report in one line which settings of a scene a block has changed."""
+    before = switched.state(scene)
+    yield
+    text = switched.sentence(before, switched.state(scene))
+    if text:
+        operator.report({"INFO"}, text)
 
 
 @contextmanager
