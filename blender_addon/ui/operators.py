@@ -10,6 +10,7 @@ from ..outputs.lens import foreground
 from ..scene import environment, frame_setup
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
+from . import engines
 from .reporting import (
     only_one_is_rendered,
     report_missing_camera,
@@ -162,10 +163,51 @@ class UMBRA_OT_set_output(bpy.types.Operator):
     def description(cls, _context: bpy.types.Context | None, properties: bpy.types.OperatorProperties | None) -> str:
         return cls.bl_description if properties is None else registry.get(properties.output).description
 
+    switch_engine: bpy.props.BoolProperty(
+        name="Switch Render Engine",
+        description="Choose the render engine as well that the output needs",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        wanted = registry.get(self.output)
+        if wanted.engine in (None, context.scene.render.engine):
+            return self.execute(context)
+        self.switch_engine = True  # and execute() is called when it is confirmed
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=f"Output: {wanted.label}",
+            message="It needs the render engine Cycles. Objects may look different there.",
+            confirm_text="Switch to Cycles",
+        )
+
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        with reporting_switches(self, context.scene):
-            report_notes(self, switching.switch(context.scene, self.output))
+        scene = context.scene
+        engine = registry.get(self.output).engine
+        with reporting_switches(self, scene):
+            if self.switch_engine and engine not in (None, scene.render.engine):
+                with engines.switched(scene, engine):
+                    notes = switching.switch(scene, self.output)
+            else:
+                notes = switching.switch(scene, self.output)
+            report_notes(self, notes)
+        return {"FINISHED"}
+
+
+class UMBRA_OT_use_cycles(bpy.types.Operator):
+    bl_idname = "umbra.use_cycles"
+    bl_label = "Switch to Cycles"
+    bl_description = "Choose the render engine Cycles, which the output Cycles Lens needs"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        with reporting_switches(self, scene), engines.switched(scene, "CYCLES"):
+            registry.of(scene).refresh(scene)
         return {"FINISHED"}
 
 
@@ -219,6 +261,7 @@ CLASSES = (
     UMBRA_OT_remove_compositor,
     UMBRA_OT_use_star_sky,
     UMBRA_OT_set_output,
+    UMBRA_OT_use_cycles,
     UMBRA_OT_foreground,
     UMBRA_OT_remove_foreground,
 )

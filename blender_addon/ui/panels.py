@@ -112,7 +112,9 @@ class VIEW3D_PT_umbra_maps(UmbraPanel, bpy.types.Panel):
         layout.use_property_split = True
         settings = context.scene.umbra
         layout.prop(settings, "map_folder")
-        layout.prop(settings, "auto_bake")
+        row = layout.row()
+        row.use_property_split = False  # the name is too long beside an empty half
+        row.prop(settings, "auto_bake")
         layout.prop(settings, "supersampling")
         layout.prop(settings, "quality")
         if settings.quality == "CUSTOM":

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carry a frame into the camera that bends its rays: for the viewport at once, for a render with its exit map."""
 
+import contextlib
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -112,4 +113,5 @@ def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
         camera_of(scene)
         show(scene, frame_setup.read(scene, depsgraph, False, TRAITS))
     except physics.BlackHoleError:  # the panel and the render say why
-        break_camera(scene)
+        with contextlib.suppress(physics.BlackHoleError):  # a Blender without OSL
+            break_camera(scene)
