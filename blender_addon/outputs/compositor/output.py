@@ -104,7 +104,7 @@ class CompositorOutput(Output):
             if scene.umbra.active_hole is None:
                 scene.umbra.active_hole = frame_setup.find_active_hole(scene)
             return self.on_hole_added(scene)
-        return _prepare(scene) + compositing.set_up(scene)
+        return _prepare(scene) + compositing.set_up(scene) + _alpha_note(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
         """Return whether anything of the set-up is in the compositor."""
@@ -141,7 +141,7 @@ class CompositorOutput(Output):
         notes += compositing.set_up(scene)
         if stars:
             self.brighten_stars(scene)
-        return notes
+        return notes + _alpha_note(scene)
 
     def brighten_stars(self, scene: bpy.types.Scene) -> None:
         """Brighten the star sky, unless the artist has set an exposure."""
@@ -247,8 +247,8 @@ class CompositorOutput(Output):
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
         """Say where the compositor is not set up."""
         if find_setup(scene) is not None:
-            left_out = environment.world_left_out(scene)
-            return [] if left_out is None else [Notice(left_out)]
+            found = environment.world_left_out(scene), environment.alpha_note(scene, may_load=False)
+            return [Notice(each) for each in found if each is not None]
         return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
@@ -271,6 +271,11 @@ def _leave_world(scene: bpy.types.Scene, error: SceneError) -> list[str]:
     """Choose an image in place of a World that cannot be the sky, and say why."""
     environment.leave_world(scene)
     return [f"The World is not the sky of the black hole. {error.for_user()}"]
+
+
+def _alpha_note(scene: bpy.types.Scene) -> list[str]:
+    note = environment.alpha_note(scene, may_load=True)
+    return [] if note is None else [note]
 
 
 def _prepare(scene: bpy.types.Scene) -> list[str]:
