@@ -57,6 +57,8 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         context.view_layer.objects.active = hole
 
         settings = scene.umbra
+        if frame_setup.holes(scene) == [hole]:  # a scene that has another one keeps its picture
+            settings.hide_behind = True
         settings.active_hole = hole
         was_world = settings.environment_source == "WORLD"
         report_notes(self, registry.of(scene).on_hole_added(scene))

@@ -18,7 +18,7 @@ from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import check_linked, check_rendered, check_unmuted, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, disk, panel
+from . import compositing, compositor_sync, depth, disk, panel
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
 
@@ -173,6 +173,7 @@ class CompositorOutput(Output):
                 f'the node group "{black_hole_group.GROUP_NAME}" was damaged or of another version, and is built anew.'
             )
         check_linked(scene)
+        depth.refresh(scene)
         compositor_sync.sync_sky(scene)
 
     def take_away(self, scene: bpy.types.Scene) -> None:
