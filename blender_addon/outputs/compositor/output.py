@@ -13,14 +13,21 @@ from ...core.physics_api import physics
 from ...nodes import black_hole_group
 from ...scene import environment, panorama
 from ...scene.frame_setup import FrameSetup
+from ...scene.shutter import Motion
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import check_linked, check_rendered, check_unmuted, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, depth, disk, panel
+from . import compositing, compositor_sync, depth, disk, objects_behind, panel
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
+MOTION_BLUR = "Motion Blur is on: where camera or hole move, objects are blurred; sky, shadow and disk stay sharp."
+DEPTH_OF_FIELD = "Depth of Field is on: objects are blurred; sky, shadow and disk stay sharp."
+NO_DEPTH = (
+    "Hide Behind the Hole has no depth pass: connect the Image of a Render Layers node to Render of the node Umbra "
+    "Black Hole, and press Update Compositor."
+)
 
 
 class CompositorOutput(Output):
@@ -234,11 +241,21 @@ class CompositorOutput(Output):
         return None if setup is None else setup.group
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
-        """Say where the compositor is not set up."""
-        if find_setup(scene) is not None:
-            left_out = environment.world_left_out(scene)
-            return [] if left_out is None else [Notice(left_out)]
-        return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        """Say where the compositor is not set up, and what it draws unbent or sharp."""
+        if find_setup(scene) is None:
+            return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        left_out = environment.world_left_out(scene)
+        texts = [] if left_out is None else [left_out]
+        if scene.umbra.hide_behind and not depth.is_in_use(scene):
+            texts.append(NO_DEPTH)
+        behind = objects_behind.find(scene, depsgraph)
+        if behind:
+            texts.append(objects_behind.sentence(behind))
+        if frame.motion is not Motion.NONE:
+            texts.append(MOTION_BLUR)
+        if frame.aperture > 0.0:
+            texts.append(DEPTH_OF_FIELD)
+        return [Notice(each) for each in texts]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
         """Return why the sky cannot be read, unless it is the artist's own nodes."""
