@@ -13,6 +13,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
+from compositor_scene import GroupRenderer
 from small_scene import add_hole, compositor, links_of, read, render
 
 SIZE = (64, 48)
@@ -205,6 +206,38 @@ def test_edges_of_near_objects_stay_smooth_and_far_ones_leave_none(
     bpy.data.objects.remove(near)
     triangle(20.0)
     assert np.max(render(scene, tmp_path / "far.exr", exr)[..., 0]) == 0.0
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_the_disk_before_the_shadow_stays(
+    addon_module: Callable[[str], ModuleType], tmp_path: Path, hidden: bool
+) -> None:
+    """Each pixel as the sum of its share of shadow and the rest, in which the layers lie over one another."""
+    rng = np.random.default_rng(3)
+    height, width = 12, 20
+    warp_map = np.ones((height, width, 4), np.float32)
+    warp_map[..., 3] = visibility = rng.random((height, width), np.float32)
+
+    def layer() -> np.ndarray:
+        alpha = rng.random((height, width, 1), np.float32)
+        return np.concatenate([rng.random((height, width, 3), np.float32) * alpha, alpha], axis=-1)
+
+    scene, disk = layer(), layer()
+    node_group = addon_module("nodes.black_hole_group")
+    depth = 7.0 if hidden else 5.0
+    values = {"Environment": (0.7, 0.5, 0.3, 1.0), "Redshift Color": 0.0, "Redshift Brightness": 0.0}
+    values |= {"Depth": depth, "Hole Depth": 6.0, "Hide Behind": 1.0}
+    picture = GroupRenderer(node_group, tmp_path).render(
+        (width, height), warp_map=warp_map, foreground=scene, disk=disk, values=values
+    )
+
+    def over(front: np.ndarray, back: np.ndarray) -> np.ndarray:
+        return front[..., :3] + (1.0 - front[..., 3:]) * back
+
+    seen = over(scene, over(disk, np.array((0.7, 0.5, 0.3))))
+    in_shadow = over(disk, np.zeros(3)) if hidden else over(scene, over(disk, np.zeros(3)))
+    share = visibility[..., None]
+    np.testing.assert_allclose(picture[..., :3], share * seen + (1.0 - share) * in_shadow, atol=2e-6)
 
 
 def test_switched_off_and_removed_it_leaves_no_trace(scene: bpy.types.Scene) -> None:
