@@ -18,6 +18,10 @@ Warp Map
 Disk
     The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. If it is not linked, there is
     no disk.
+Depth, Hole Depth, Hide Behind
+    The Depth output of the Render Layers node that feeds Render; the depth of the hole's center in the same measure
+    (along the camera's axis for a perspective camera, from the camera for a panorama); and 1 to hide, inside the
+    shadow, what is deeper than that. If Depth is not linked, nothing is hidden.
 Environment Rotation, Environment Strength
     The values of the World's Mapping node (type Point) and of its Background node.
 
@@ -35,7 +39,7 @@ from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 3
+GROUP_VERSION = 4
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
@@ -84,6 +88,28 @@ DISK = SocketSpec(
     default=(0.0, 0.0, 0.0, 0.0),
     hide_value=True,
 )
+DEPTH = SocketSpec(
+    "Depth",
+    "NodeSocketFloat",
+    "The depth pass of the render: what is deeper than the hole is hidden inside the shadow",
+    default=0.0,
+    hide_value=True,
+)
+HOLE_DEPTH = SocketSpec(
+    "Hole Depth",
+    "NodeSocketFloat",
+    "Depth of the hole's center, as the depth pass measures it; it follows camera and hole by a driver",
+    default=0.0,
+)
+HIDE_BEHIND = SocketSpec(
+    "Hide Behind",
+    "NodeSocketFloat",
+    "1 hides what is behind the hole and inside its shadow, by the depth pass; 0 shows all of the render",
+    default=0.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
 IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
 SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole, its disk and the sky without the scene", in_out="OUTPUT")
 SHADOW = SocketSpec(
@@ -107,6 +133,9 @@ INPUTS = (
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
     DISK,
+    DEPTH,
+    HOLE_DEPTH,
+    HIDE_BEHIND,
 )
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
@@ -123,6 +152,9 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
         redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
         temperature=values[TEMPERATURE.name],
         disk=values[DISK.name],
+        depth=values[DEPTH.name],
+        hole_depth=values[HOLE_DEPTH.name],
+        hide_behind=values[HIDE_BEHIND.name],
     )
     results = black_hole_nodes.build(builder, inputs)
     return {

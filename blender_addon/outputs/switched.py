@@ -33,6 +33,8 @@ def state(scene: bpy.types.Scene) -> State:
     found |= _values("umbra", scene.umbra, _OWN)
     if hasattr(scene, "node_tree"):  # before 5.0; after that the setting is always on
         found |= _values("scene", scene, ("use_nodes",))
+    for layer in scene.view_layers:
+        found[f"pass {layer.name}"] = (f'Depth pass of view layer "{layer.name}"', "on" if layer.use_pass_z else "off")
     found["world"] = ("World", "none" if scene.world is None else f'"{scene.world.name}"')
     found["camera"] = ("Camera", "none" if scene.camera is None else f'"{scene.camera.name}"')
     for camera in _cameras(scene):

@@ -60,13 +60,15 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         if hole.name not in context.view_layer.objects:  # that collection is excluded here
             context.collection.objects.unlink(hole)
             scene.collection.objects.link(hole)
-        former = scene.umbra.active_hole
+        former = scene.umbra.active_hole, scene.umbra.hide_behind
         scene.umbra.active_hole = hole
+        if frame_setup.holes(scene) == [hole]:  # a scene that has another one keeps its picture
+            scene.umbra.hide_behind = True
         try:
             with reporting_switches(self, scene), reporting_sky(self, scene):
                 report_notes(self, registry.of(scene).on_hole_added(scene))
         except physics.BlackHoleError:  # which leaves the scene as it was
-            scene.umbra.active_hole = former
+            scene.umbra.active_hole, scene.umbra.hide_behind = former
             bpy.data.objects.remove(hole)
             raise
         for each in context.selected_objects:

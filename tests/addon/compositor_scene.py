@@ -161,6 +161,7 @@ class GroupRenderer:
         warp_map: FloatArray | None = None,
         environment: FloatArray | None = None,
         foreground: FloatArray | None = None,
+        disk: FloatArray | None = None,
         output: str = "Image",
         percentage: int = 100,
         values: Mapping[str, object] | None = None,
@@ -168,7 +169,8 @@ class GroupRenderer:
         scene = empty_scene(*size, percentage)
         tree, target = compositor_tree(scene)
         node = self.node_group.add_group_node(tree)
-        for name, pixels in (("Warp Map", warp_map), ("Environment", environment), ("Render", foreground)):
+        pictures = {"Warp Map": warp_map, "Environment": environment, "Render": foreground, "Disk": disk}
+        for name, pixels in pictures.items():
             if pixels is not None:
                 source = image_node(tree, write_exr(self.folder / f"{name}.exr", pixels))
                 tree.links.new(source.outputs["Image"], node.inputs[name])

@@ -36,6 +36,7 @@ from ..shared.tree_editing import (
     output_node,
     remove_tree,
 )
+from . import depth
 from .compositor_sync import refresh
 
 BEFORE = "umbra_before"
@@ -221,6 +222,7 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     setup = find_setup(scene)
     if setup is not None:
         disk_sync.remove(tree)
+    depth.remove(scene)
     for group in find_nodes(tree, GROUP):
         give_back(tree, group, "Render")
         prefix = group.path_from_id() + "."

@@ -15,7 +15,7 @@ from ...scene.node_paths import Place
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
 from ..shared.map_images import NO_MAP, plain_map, read_sequence
-from . import disk
+from . import depth, disk
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
 
@@ -52,6 +52,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     repair(scene, thorough=False)
     disk_light.refresh(scene, frame_setup.find_active_hole(scene))
     disk.refresh(scene)
+    depth.refresh(scene)
     try:
         point_at_maps(scene)
     except SceneError as error:

@@ -13,14 +13,21 @@ from ...core.physics_api import physics
 from ...nodes import black_hole_group
 from ...scene import environment, frame_setup, instanced_hole, panorama
 from ...scene.frame_setup import FrameSetup
+from ...scene.shutter import Motion
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import check_linked, check_rendered, check_unmuted, find_setup, find_tree, is_in_use
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, disk, panel
+from . import compositing, compositor_sync, depth, disk, objects_behind, panel
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
+MOTION_BLUR = "Motion Blur is on: where camera or hole move, objects are blurred; sky, shadow and disk stay sharp."
+DEPTH_OF_FIELD = "Depth of Field is on: objects are blurred; sky, shadow and disk stay sharp."
+NO_DEPTH = (
+    "Hide Behind the Hole has no depth pass: connect the Image of a Render Layers node to Render of the node Umbra "
+    "Black Hole, and press Update Compositor."
+)
 
 
 class CompositorOutput(Output):
@@ -185,6 +192,7 @@ class CompositorOutput(Output):
                 f'the node group "{black_hole_group.GROUP_NAME}" was damaged or of another version, and is built anew.'
             )
         check_linked(scene)
+        depth.refresh(scene)
         compositor_sync.sync_sky(scene)
 
     def take_away(self, scene: bpy.types.Scene) -> None:
@@ -245,11 +253,20 @@ class CompositorOutput(Output):
         return None if setup is None else setup.group
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
-        """Say where the compositor is not set up."""
-        if find_setup(scene) is not None:
-            found = environment.world_left_out(scene), environment.alpha_note(scene, may_load=False)
-            return [Notice(each) for each in found if each is not None]
-        return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        """Say where the compositor is not set up, and what it draws unbent or sharp."""
+        if find_setup(scene) is None:
+            return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        found = [environment.world_left_out(scene), environment.alpha_note(scene, may_load=False)]
+        if scene.umbra.hide_behind and not depth.is_in_use(scene):
+            found.append(NO_DEPTH)
+        behind = objects_behind.find(scene, depsgraph)
+        if behind:
+            found.append(objects_behind.sentence(behind))
+        if frame.motion is not Motion.NONE:
+            found.append(MOTION_BLUR)
+        if frame.aperture > 0.0:
+            found.append(DEPTH_OF_FIELD)
+        return [Notice(each) for each in found if each is not None]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
         """Return why the sky cannot be read, unless it is the artist's own nodes."""
