@@ -20,6 +20,7 @@ from .ui import (
     cache_panel,
     disk_panel,
     farm_operators,
+    hole_overlay,
     operators,
     panels,
     preview_panel,
@@ -51,6 +52,7 @@ _MODULES = (
     operators,
     render_operators,
     preview_panel,
+    hole_overlay,
     handlers,
     command_line,
 )

@@ -51,6 +51,7 @@ from .images.png import write_png
 from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
 from .kerr.observer import Observer, local_velocity
 from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
+from .kerr.shadow_outline import shadow_outline
 from .light.color import CHANNEL_WAVELENGTHS, SECOND_RADIATION_CONSTANT, redshift_gain
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
 from .light.disk_flux import PROFILES as DISK_PROFILES
@@ -261,6 +262,7 @@ __all__ = [
     "render_reference",
     "replacing_file",
     "shade_disk",
+    "shadow_outline",
     "sky_levels",
     "star_sky",
     "temporary_target",

@@ -27,6 +27,11 @@ def warn(text: str) -> None:
     print(f"Umbra: {text}", file=sys.stderr, flush=True)
 
 
+def tell(text: str) -> None:
+    """Say what was done, on the console: no fault, and so not among the errors."""
+    print(f"Umbra: {text}", flush=True)
+
+
 def popup(text: str) -> None:
     """Show a sentence in the window as soon as Blender's main thread is free; safe from a render's thread."""
     if text in _pending.now:

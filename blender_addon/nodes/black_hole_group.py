@@ -20,6 +20,10 @@ Warp Map
 Disk
     The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. If it is not linked, there is
     no disk.
+Depth, Hole Depth, Hide Behind
+    The Depth output of the Render Layers node that feeds Render; the depth of the hole's center in the same measure
+    (along the camera's axis for a perspective camera, from the camera for a panorama); and 1 to hide, inside the
+    shadow, what is deeper than that. If Depth is not linked, nothing is hidden.
 Sky Levels
     An Image node with `physics.sky_levels(...).atlas()` of the same sky, scene-linear. If it is not linked, the sky is
     not filtered.
@@ -95,6 +99,28 @@ DISK = SocketSpec(
     default=(0.0, 0.0, 0.0, 0.0),
     hide_value=True,
 )
+DEPTH = SocketSpec(
+    "Depth",
+    "NodeSocketFloat",
+    "The depth pass of the render: what is deeper than the hole is hidden inside the shadow",
+    default=0.0,
+    hide_value=True,
+)
+HOLE_DEPTH = SocketSpec(
+    "Hole Depth",
+    "NodeSocketFloat",
+    "Depth of the hole's center, as the depth pass measures it; it follows camera and hole by a driver",
+    default=0.0,
+)
+HIDE_BEHIND = SocketSpec(
+    "Hide Behind",
+    "NodeSocketFloat",
+    "1 hides what is behind the hole and inside its shadow, by the depth pass; 0 shows all of the render",
+    default=0.0,
+    minimum=0.0,
+    maximum=1.0,
+    subtype="FACTOR",
+)
 LEVELS = SocketSpec(
     "Sky Levels",
     "NodeSocketColor",
@@ -132,6 +158,9 @@ INPUTS = (
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
     DISK,
+    DEPTH,
+    HOLE_DEPTH,
+    HIDE_BEHIND,
     LEVELS,
     FOOTPRINT,
 )
@@ -150,6 +179,9 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
         redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
         temperature=values[TEMPERATURE.name],
         disk=values[DISK.name],
+        depth=values[DEPTH.name],
+        hole_depth=values[HOLE_DEPTH.name],
+        hide_behind=values[HIDE_BEHIND.name],
         levels=values[LEVELS.name],
         footprint=values[FOOTPRINT.name],
     )

@@ -16,7 +16,7 @@ from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_intege
 from .builder import Float, TreeBuilder, Vector
 from .filtered_sky import filtered
 from .image_lookup import sample_bilinearly
-from .image_nodes import separate_color
+from .image_nodes import erode, separate_color
 from .redshift import redshift_gain
 from .render_size import to_render_size
 
@@ -25,6 +25,12 @@ from .render_size import to_render_size
 _EIGHTH_TURN = math.pi / 4.0
 _EIGHTH_TURN_COARSE = round(_EIGHTH_TURN * 2**14) / 2**14
 _EIGHTH_TURN_FINE = _EIGHTH_TURN - _EIGHTH_TURN_COARSE
+
+EDGE = 2
+"""How many pixels beyond its own an object can shine, by the pixel filter and at its corners."""
+
+NO_DEPTH = 1e9
+"""Blender's depth pass is 1e10 where there is no object."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,9 @@ class GroupInputs:
     redshift_brightness: Float
     temperature: Float
     disk: Vector
+    depth: Float
+    hole_depth: Float
+    hide_behind: Float
     levels: Vector
     footprint: Vector
 
@@ -110,8 +119,10 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
         data = combine(channels.visibility, channels.one_plus_z, channels.valid)
     with builder.frame("To the render's size"):
         sky, data = to_render_size(builder, sky, data)
+    with builder.frame("Behind the hole"):
+        behind = _behind(inputs)
     with builder.frame("Picture"):
-        return _compose(inputs, sky, data)
+        return _compose(inputs, sky, data, behind)
 
 
 def _read_map(warp_map: Vector) -> _MapChannels:
@@ -182,13 +193,32 @@ def _split_angle(angle: Float) -> _Angle:
     return _Angle(eighths, multiply_add(eighths, -_EIGHTH_TURN_FINE, rest))
 
 
-def _compose(inputs: GroupInputs, sky: Vector, data: Vector) -> GroupOutputs:
-    """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames."""
+def _behind(inputs: GroupInputs) -> Float:
+    """1 where the render is deeper than the hole and that counts, else 0.
+
+    The depth pass has one depth per pixel, that of its center, while the edges of objects cover pixels in part. A pixel
+    whose center sees no object takes the depth of the nearest object beside it: that is what covers its edge. Without
+    one it shows what has no depth, such as a volume, which stays.
+    """
+    is_empty = inputs.depth.greater_than(NO_DEPTH).labeled("No object?")
+    depth = where(is_empty, erode(inputs.depth, EDGE), inputs.depth).labeled("Depth")
+    deeper = depth.greater_than(inputs.hole_depth) * depth.less_than(NO_DEPTH)
+    return deeper * clamp(inputs.hide_behind, 0.0, 1.0)
+
+
+def _compose(inputs: GroupInputs, sky: Vector, data: Vector, behind: Float) -> GroupOutputs:
+    """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames.
+
+    Of what is behind the hole only the share of a pixel is seen that is not shadow. The rest shows the disk; there is
+    no sky in it to be covered.
+    """
     visibility, one_plus_z, valid = data.separate()
     _, _, _, covered = separate_color(inputs.disk)
     sky = multiply_add(sky, 1.0 - covered, inputs.disk)
     _, _, _, alpha = separate_color(inputs.render)
-    image = multiply_add(sky, 1.0 - alpha, inputs.render)
+    hidden = ((1.0 - visibility) * behind).labeled("Hidden")
+    image = multiply_add(sky, 1.0 - alpha, inputs.render * (1.0 - hidden))
+    image = multiply_add(inputs.disk, alpha * hidden, image)
     return GroupOutputs(
         image=where(valid, image, physics.INVALID_MAP_COLOR).labeled("Magenta if invalid"),
         sky=sky,

@@ -113,6 +113,18 @@ def translate(image: Vector, x: Float, y: Float, interpolation: str) -> Vector:
     return Vector(image.builder, node.outputs[0])
 
 
+def erode(image: Float, pixels: int) -> Float:
+    """The smallest value within so many pixels to each side."""
+    node = image.builder.node("CompositorNodeDilateErode")
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
+        node.inputs["Type"].default_value = "Steps"
+    else:
+        node.mode = "STEP"
+    node.inputs["Size"].default_value = -pixels
+    image.builder.feed(node.inputs[0], image)
+    return Float(image.builder, node.outputs[0])
+
+
 def _resampling_node(image: Vector, kind: str, interpolation: str) -> bpy.types.Node:
     node = image.builder.node(kind)
     image.builder.feed(node.inputs["Image"], image)

@@ -79,6 +79,8 @@ class Output(ABC):
     label: str
     description: str
     traits: Traits = PLAIN
+    engine: str | None = None
+    """The only render engine that it works in, if there is one."""
 
     # --- setting a scene up -----------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from ..core import changes, messages
 from ..core.changes import Change
 from ..core.errors import SceneError
 from ..core.physics_api import physics
-from . import registry
+from . import registry, switched
 from .protocol import Look, Output
 from .refreshing import refresh_disk
 from .shared import leaving
@@ -76,8 +76,12 @@ def on_setting_changed(owner: bpy.types.ID) -> None:
     if not isinstance(owner, bpy.types.Scene):
         return
     try:
+        before = switched.state(owner)
         for note in switch(owner, owner.umbra.output):
             messages.warn(note)
+        text = switched.sentence(before, switched.state(owner))
+        if text:
+            messages.tell(text)
     except physics.BlackHoleError as error:
         messages.warn(error.for_user())
         messages.popup(error.for_user())

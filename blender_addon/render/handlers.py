@@ -55,6 +55,8 @@ class _Render:
     """The maps that it shows, as they were when they were checked."""
     placed: object = None
     """How hole and camera stood then."""
+    moment: float = 0.0
+    """The frame at which they stood there, with its part."""
     name: str = ""
     """The scene's name when the render began."""
     step_in: Callable[[], None] | None = None
@@ -154,7 +156,11 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     if depsgraph.mode != "RENDER" and not now.is_running:
         disk_light.follow(scene, frame_setup.find_active_hole(scene))
         registry.of(scene).follow(scene, depsgraph)
-    if depsgraph.mode != "RENDER" or not (now.is_waiting or now.shown) or _lets_others_go_first(now):
+    if depsgraph.mode != "RENDER" or not (now.is_waiting or now.shown):
+        return
+    if now.shown and scene.frame_current_final != now.moment:  # Cycles looks at other moments for its motion blur
+        return
+    if _lets_others_go_first(now):
         return
     if now.is_waiting:
         _guarded(lambda each: _provide_maps(each, depsgraph), scene)
@@ -237,6 +243,7 @@ def _provide_maps(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
         messages.warn(warning)
     now = _renders.of(scene)
     now.shown, now.placed, now.files, now.is_waiting = frame.parameters, _placed(scene), files, False
+    now.moment = scene.frame_current_final
 
 
 # --- beside other add-ons -------------------------------------------------------------------------

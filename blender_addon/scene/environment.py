@@ -14,9 +14,8 @@ from ..core import color_spaces
 from ..core.blender_version import NODES_ARE_OPTIONAL
 from ..core.errors import SceneError
 from ..core.physics_api import PACKAGE, physics
-from ..core.session import SESSION, Life
-from . import panorama, sky_frames, world_digest
-from .node_paths import Place, source, world_output
+from . import followed, panorama, sky_alpha, sky_frames, world_digest
+from .node_paths import SHINING, Place, source, world_output
 
 # On a scene whose World is replaced, by a lensed copy or by one that shows the sky's image: the World itself.
 WORLD_BEFORE = "umbra_world_before"
@@ -121,7 +120,7 @@ def _plain_color(world: bpy.types.World) -> SceneError:
 def _plain_image(world: bpy.types.World, output: bpy.types.Node) -> Sky:
     """The sky of a World that is an image with rotation and strength."""
     background = source(Place(output.inputs["Surface"]))
-    if not background.is_output or background.node.type != "BACKGROUND":
+    if not background.is_output or background.node.type not in SHINING:
         raise _no_plain_image(world, background.node)
     texture, strength = background.input("Color"), background.input("Strength")
     if not texture.is_output:
@@ -143,11 +142,27 @@ def _plain_image(world: bpy.types.World, output: bpy.types.Node) -> Sky:
 
 def _image_as_shown(scene: bpy.types.Scene, image: bpy.types.Image, *, may_render: bool) -> bpy.types.Image:
     """The image as a World shows it: Cycles multiplies the alpha of 8-bit images into colors as they are encoded."""
-    if scene.render.engine != _CYCLES or not _alpha_counts(image):
+    if scene.render.engine != _CYCLES or not sky_alpha.counts(image):
         return image
     if may_render:
         return panorama.of_image(image)
     return panorama.find(world_digest.of_image(image)) or _missing_panorama(f'the sky image "{image.name}"')
+
+
+def _panorama_of(world: bpy.types.World, output: bpy.types.Node, *, may_render: bool) -> Sky:
+    """The sky of any other World."""
+    parts = followed.of(world, output)
+    refusal = panorama.problem(world, output, parts)
+    if refusal is not None:
+        raise refusal from None
+    if may_render:
+        image = panorama.of_world(world, output, parts)
+    else:
+        image = panorama.find(world_digest.of_world(output, parts)) or _missing_panorama(f'World "{world.name}"')
+    sky = Sky(image, rotation_at=parts.rotation, strength_at=parts.strength)
+    if parts.rotation is not None:
+        sky = replace(sky, rotation=_angles(parts.rotation.value))
+    return sky if parts.strength is None else replace(sky, strength=parts.strength.value)
 
 
 def _missing_panorama(what: str) -> bpy.types.Image:
@@ -158,22 +173,22 @@ def _missing_panorama(what: str) -> bpy.types.Image:
     )
 
 
-# Images by name, file and mode -> whether any alpha is less than 1.
-_transparent = SESSION.value(dict[tuple[object, ...], bool], Life.FILE)
+def alpha_note(scene: bpy.types.Scene, *, may_load: bool) -> str | None:
+    """Return a warning where the compositor shows an image sequence brighter than Cycles shows it as a World, if so.
 
-
-def _alpha_counts(image: bpy.types.Image) -> bool:
-    if image.source not in {"FILE", "GENERATED"} or image.alpha_mode not in {"STRAIGHT", "PREMUL"}:
-        return False
-    width, height = image.size
-    if image.is_float or image.channels != 4 or width * height == 0:
-        return False
-    key = (image.session_uid, image.filepath, width, height, image.is_dirty)
-    if key not in _transparent.now:
-        values = np.empty(width * height * 4, np.float32)
-        image.pixels.foreach_get(values)
-        _transparent.now[key] = bool(values[3::4].min() < 1.0)
-    return _transparent.now[key]
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    may_load : bool
+        Whether a file of the sequence is read for this. Otherwise what is known of it counts.
+    """
+    if scene.render.engine != _CYCLES:
+        return None
+    try:
+        return sky_alpha.note(read(scene).image, may_load=may_load)
+    except SceneError:
+        return None
 
 
 def read_world(scene: bpy.types.Scene, *, may_render: bool = False) -> Sky:
@@ -196,13 +211,7 @@ def read_world(scene: bpy.types.Scene, *, may_render: bool = False) -> Sky:
     try:
         sky = _plain_image(world, output)
     except _NoPlainImageError:
-        refusal = panorama.problem(world, output)
-        if refusal is not None:
-            raise refusal from None
-        if may_render:
-            return Sky(panorama.of_world(world, output))
-        image = panorama.find(world_digest.of_world(output))
-        return Sky(image or _missing_panorama(f'World "{world.name}"'))
+        sky = _panorama_of(world, output, may_render=may_render)
     image = _image_as_shown(scene, sky.image, may_render=may_render)
     rotation, strength = sky.rotation, sky.strength
     if scene.world is not None and scene.world != world:
@@ -232,7 +241,7 @@ def world_left_out(scene: bpy.types.Scene) -> str | None:
         output = _output_of(scene, world)
         _plain_image(world, output)
     except _NoPlainImageError:
-        refusal = panorama.problem(world, output)
+        refusal = panorama.problem(world, output, followed.of(world, output))
     except SceneError as error:
         refusal = error
     else:

@@ -5,8 +5,6 @@ Plain functions over evaluated data. Nothing here writes to the scene, except `r
 which step to other frames and back.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +17,12 @@ from ..core.physics_api import physics
 from ..settings.disk_properties import disk_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
-from . import drivers, rotations
+from . import drivers, instanced_hole, rotations, shutter
 from .camera_type import original_type
 from .enabled import is_enabled
 from .rotations import Matrix, Vector
+from .shutter import Motion
+from .stepping import frame_kept
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -43,6 +43,8 @@ class Traits:
     """Whether Crop to Render Region is supported."""
     any_camera: bool = False
     """Whether the map is looked up by direction, so that the camera's lens does not matter."""
+    blurs: bool = True
+    """Whether motion blur of camera or hole makes no wrong picture, at most a sharp one; else it is refused."""
 
 
 PLAIN = Traits()
@@ -61,6 +63,9 @@ class FrameSetup:
     """Lens shift of the camera as Blender has it."""
     aperture: float
     """Radius of the camera's aperture, scene units, 0 without depth of field: Cycles' for any but custom cameras."""
+
+    motion: Motion = Motion.NONE
+    """What camera and hole do while the shutter is open; none without motion blur."""
 
     @property
     def distance(self) -> float:
@@ -101,11 +106,13 @@ def active_hole(scene: bpy.types.Scene) -> bpy.types.Object:
     Raises
     ------
     SceneError
-        There is none, or it was deleted, or there are several and none is chosen.
+        There is none, or it was deleted, or is in a collection instance, or there are several and none is chosen.
     """
     hole = find_active_hole(scene)
     if hole is not None:
         return hole
+    if not holes(scene):
+        instanced_hole.check(scene)
     chosen = scene.umbra.active_hole
     if chosen is not None:
         raise SceneError(
@@ -228,7 +235,7 @@ def camera_velocity(
         difference: Vector = np.subtract(places[0], places[1], dtype=np.float64)
         return difference
 
-    with _frame_kept(scene):
+    with frame_kept(scene):
         earlier, early = separation(frame - 1, 0.0), separation(frame - 1, 0.5)
         late, later = separation(frame, 0.5), separation(frame + 1, 0.0)
     over_one, over_two = late - early, 0.5 * (later - earlier)
@@ -278,17 +285,6 @@ def _local_velocity(
         "its place beside the hole; slow its animation down, or raise the black hole's Speed of Light.",
         code="camera.too-fast",
     )
-
-
-@contextmanager
-def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    """Go back to the current frame afterwards, whatever happens."""
-    frame, part = scene.frame_current, scene.frame_subframe
-    try:
-        yield
-    finally:
-        if (scene.frame_current, scene.frame_subframe) != (frame, part):
-            scene.frame_set(frame, subframe=part)
 
 
 # --- camera ---------------------------------------------------------------------------------------
@@ -410,6 +406,36 @@ def _aperture(camera: bpy.types.Camera) -> float:
     return camera.lens * 1e-3 / (2.0 * max(camera.dof.aperture_fstop, 1e-5))
 
 
+def _motion(
+    scene: bpy.types.Scene,
+    objects: tuple[bpy.types.Object, bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    measured: bool,
+    traits: Traits,
+) -> Motion:
+    """Return what camera and hole do within the frame, or refuse it for an output that would draw it wrong.
+
+    Raises
+    ------
+    SceneError
+        Motion blur is on, and the camera or the hole moves.
+    """
+    found = Motion.NONE
+    for each in objects if shutter.is_blurred(scene) else ():
+        motion = shutter.motion_of(scene, each)
+        if motion is not Motion.NONE and measured and not traits.blurs:
+            layer = scene.view_layers.get(depsgraph.view_layer.name) or scene.view_layers[0]
+            motion = Motion.MOVES if shutter.moves(scene, each, layer) else Motion.NONE
+        if motion is Motion.MOVES and not traits.blurs:
+            raise SceneError(
+                f'Motion Blur is on, and "{each.name}" moves while the shutter is open, which the bent rays cannot '
+                "follow: switch Motion Blur off in Render Properties, or choose Output: Compositor.",
+                code="lens.motion-blur",
+            )
+        found = found if motion is Motion.NONE or found is Motion.MOVES else motion
+    return found
+
+
 # --- all together ---------------------------------------------------------------------------------
 
 
@@ -491,9 +517,10 @@ def read(
         disk=disk_of(hole_settings.disk),
     )
     parameters.validate()
+    motion = _motion(scene, (camera, hole), depsgraph, measured, traits)
     data = evaluated_camera.data
     shift = (data.shift_x, data.shift_y)
-    return FrameSetup(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data))
+    return FrameSetup(scene.frame_current, hole.name, parameters, length_of_m, shift, _aperture(data), motion)
 
 
 def read_at(
@@ -518,7 +545,7 @@ def read_at(
         See `read`.
     """
     layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
-    with _frame_kept(scene):
+    with frame_kept(scene):
         scene.frame_set(frame)
         return read(scene, layer.depsgraph, traits=traits)
 

@@ -11,6 +11,9 @@ import bpy
 
 from ..core.blender_version import NODES_ARE_OPTIONAL
 
+# Kinds of nodes that make light of a color and a strength; in a World, Emission shines as Background does.
+SHINING = frozenset({"BACKGROUND", "EMISSION"})
+
 
 @dataclass(frozen=True)
 class Place:

@@ -20,7 +20,8 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
-from . import image_world, sky_frames, world_digest
+from . import followed, image_world, sky_frames, world_digest
+from .followed import Followed
 from .node_paths import reachable
 
 is_rendering = SESSION.value(bool, Life.RENDER)
@@ -42,11 +43,12 @@ _LARGEST_HALF = float(np.finfo(np.float16).max)
 _OF_THE_CAMERA = frozenset({"Camera", "Window"})
 
 
-def problem(world: bpy.types.World, output: bpy.types.Node) -> SceneError | None:
-    """Return why a World can have no panorama, if so."""
+def problem(world: bpy.types.World, output: bpy.types.Node, parts: Followed) -> SceneError | None:
+    """Return why a World can have no panorama, if so; what is followed beside it may be animated."""
     nodes = list(reachable(output.inputs["Surface"]))
     owners: list[Any] = [world, *{node.id_data.as_pointer(): node.id_data for node in nodes}.values()]
-    moving = next((each for each in owners if _is_animated(each)), None)
+    apart = {each.path for each in parts.places}
+    moving = next((each for each in owners if followed.animated(each) - apart), None)
     if moving is not None:
         return _moves(world, f'"{moving.name}" is animated')
     for node in nodes:
@@ -82,20 +84,13 @@ def _moves(world: bpy.types.World, reason: str) -> SceneError:
     )
 
 
-def _is_animated(owner: Any) -> bool:
-    found = owner.animation_data
-    if found is None:
-        return False
-    return found.action is not None or len(found.drivers) > 0 or len(found.nla_tracks) > 0
-
-
 def find(digest: str) -> bpy.types.Image | None:
     """Return the panorama of a digest, if the file has it."""
     return next((each for each in bpy.data.images if each.get(KEY) == digest), None)
 
 
-def of_world(world: bpy.types.World, output: bpy.types.Node) -> bpy.types.Image:
-    """Return the panorama of a World, rendered unless there is one of it as it is.
+def of_world(world: bpy.types.World, output: bpy.types.Node, parts: Followed) -> bpy.types.Image:
+    """Return the panorama of a World without what is followed, rendered unless there is one of it as it is.
 
     Raises
     ------
@@ -103,13 +98,15 @@ def of_world(world: bpy.types.World, output: bpy.types.Node) -> bpy.types.Image:
         It cannot be rendered.
     """
     images = _images(output)
-    present = _present(world_digest.of_world(output), images)
+    digest = world_digest.of_world(output, parts)
+    present = _present(digest, images)
     if present is not None:
         return present
     copy = world.copy()
     try:
         _keep_surface(copy, output.name)
-        return _render(copy, _width(images), world.name, world_digest.of_world(output), _stamp(images))
+        parts.make_neutral(copy)
+        return _render(copy, _width(images), world.name, digest, _stamp(images))
     finally:
         bpy.data.worlds.remove(copy)
 

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 
 from . import sky_frames
+from .followed import Followed
 from .node_paths import group_output, reachable
 
 _LENGTH = 16
@@ -39,9 +40,9 @@ _NOT_MEANT = frozenset(
 )
 
 
-def of_world(output: bpy.types.Node) -> str:
-    """Return the digest of what feeds a World's output."""
-    return _digest(_shader(output.inputs["Surface"]))
+def of_world(output: bpy.types.Node, parts: Followed) -> str:
+    """Return the digest of what feeds a World's output, without what is followed."""
+    return _digest(_shader(output.inputs["Surface"], parts))
 
 
 def of_image(image: bpy.types.Image) -> str:
@@ -53,7 +54,7 @@ def _digest(lines: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:_LENGTH]
 
 
-def _shader(socket: bpy.types.NodeSocket) -> list[str]:
+def _shader(socket: bpy.types.NodeSocket, parts: Followed) -> list[str]:
     nodes = list(reachable(socket))
     trees = {node.id_data.as_pointer(): node.id_data for node in nodes}
     lines = [_link(link) for link in socket.links]
@@ -63,7 +64,8 @@ def _shader(socket: bpy.types.NodeSocket) -> list[str]:
         if node.type == "GROUP" and node.node_tree is not None:
             lines.append(f"group {node.node_tree.name}")
         for each in node.inputs:
-            lines += _input(each)
+            if not parts.has(each):
+                lines += _input(each)
     for tree in sorted(trees.values(), key=lambda each: each.name):
         end = group_output(tree)
         for each in () if end is None else end.inputs:

@@ -196,6 +196,14 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         type=bpy.types.Image,
         update=lambda settings, _context: _refresh(settings),
     )
+    hide_behind: bpy.props.BoolProperty(
+        name="Hide Behind the Hole",
+        description="Objects behind the hole are hidden where its shadow is in front of them, by the depth pass. "
+        "Outside of the shadow they are drawn unbent",
+        default=False,  # files of before have the picture of before; Add > Black Hole switches it on
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
     auto_bake: bpy.props.BoolProperty(
         name="Bake When Rendering",
         description="Rendering bakes by itself each warp map that is missing or out of date. Switched off, "

@@ -69,4 +69,5 @@ class SceneSettings(_Group):
     method: str
     environment_source: str
     environment_image: bpy.types.Image | None
+    hide_behind: bool
     auto_bake: bool

@@ -87,12 +87,11 @@ class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.use_property_split = True
         settings = frame_setup.active_hole(context.scene).umbra.disk
         layout.active = settings.enabled
         for name in physics.DISK_SETTINGS:
             if name not in (*IN_FRONT, *OF_STREAKS) and (name != "exponent" or settings.profile == "power_law"):
-                layout.prop(settings, name)
+                layout.prop(settings, name)  # its name inside: some are too long to stand beside their fields
         layout.separator()
         layout.template_ID(settings, "texture", open="image.open", text="Texture")
         if settings.texture is not None:

@@ -3,13 +3,22 @@
 
 import bpy
 
+from ..core.physics_api import physics
 from ..outputs import registry, switching
 from ..outputs.compositor.output import CompositorOutput
 from ..outputs.lens import foreground
 from ..scene import environment, frame_setup
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
-from .reporting import only_one_is_rendered, report_notes, reporting
+from . import engines
+from .reporting import (
+    only_one_is_rendered,
+    report_missing_camera,
+    report_notes,
+    reporting,
+    reporting_sky,
+    reporting_switches,
+)
 
 HOLE_NAME = "Black Hole"
 
@@ -51,24 +60,24 @@ class UMBRA_OT_add_black_hole(bpy.types.Operator):
         if hole.name not in context.view_layer.objects:  # that collection is excluded here
             context.collection.objects.unlink(hole)
             scene.collection.objects.link(hole)
+        former = scene.umbra.active_hole, scene.umbra.hide_behind
+        scene.umbra.active_hole = hole
+        if frame_setup.holes(scene) == [hole]:  # a scene that has another one keeps its picture
+            scene.umbra.hide_behind = True
+        try:
+            with reporting_switches(self, scene), reporting_sky(self, scene):
+                report_notes(self, registry.of(scene).on_hole_added(scene))
+        except physics.BlackHoleError:  # which leaves the scene as it was
+            scene.umbra.active_hole, scene.umbra.hide_behind = former
+            bpy.data.objects.remove(hole)
+            raise
         for each in context.selected_objects:
             each.select_set(False)
         hole.select_set(True)
         context.view_layer.objects.active = hole
-
-        settings = scene.umbra
-        settings.active_hole = hole
-        was_world = settings.environment_source == "WORLD"
-        report_notes(self, registry.of(scene).on_hole_added(scene))
-        image = settings.environment_image
-        has_changed = was_world and settings.environment_source == "IMAGE"
-        if has_changed and image is not None and environment.world_left_out(scene) is None:
-            why = "The scene has no World" if scene.world is None else f'World "{scene.world.name}" is a plain color'
-            self.report({"INFO"}, f'{why}: the sky is the image "{image.name}".')
         if len(frame_setup.holes(scene)) > 1:
             self.report({"WARNING"}, only_one_is_rendered(scene))
-        if scene.camera is None:
-            self.report({"WARNING"}, "The scene has no camera yet: add one to render the black hole.")
+        report_missing_camera(self, scene)
         return {"FINISHED"}
 
 
@@ -99,7 +108,11 @@ class UMBRA_OT_setup_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        report_notes(self, compositor().set_up(context.scene))
+        scene = context.scene
+        with reporting_switches(self, scene), reporting_sky(self, scene):
+            report_notes(self, compositor().set_up(scene))
+        if frame_setup.holes(scene):
+            report_missing_camera(self, scene)
         return {"FINISHED"}
 
 
@@ -115,7 +128,8 @@ class UMBRA_OT_remove_compositor(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        compositor().take_out(context.scene)
+        with reporting_switches(self, context.scene):
+            compositor().take_out(context.scene)
         return {"FINISHED"}
 
 
@@ -147,9 +161,55 @@ class UMBRA_OT_set_output(bpy.types.Operator):
         default=1,
     )
 
+    @classmethod
+    def description(cls, _context: bpy.types.Context | None, properties: bpy.types.OperatorProperties | None) -> str:
+        return cls.bl_description if properties is None else registry.get(properties.output).description
+
+    switch_engine: bpy.props.BoolProperty(
+        name="Switch Render Engine",
+        description="Choose the render engine as well that the output needs",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        wanted = registry.get(self.output)
+        if wanted.engine in (None, context.scene.render.engine):
+            return self.execute(context)
+        self.switch_engine = True  # and execute() is called when it is confirmed
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=f"Output: {wanted.label}",
+            message="It needs the render engine Cycles. Objects may look different there.",
+            confirm_text="Switch to Cycles",
+        )
+
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        report_notes(self, switching.switch(context.scene, self.output))
+        scene = context.scene
+        engine = registry.get(self.output).engine
+        with reporting_switches(self, scene):
+            if self.switch_engine and engine not in (None, scene.render.engine):
+                with engines.switched(scene, engine):
+                    notes = switching.switch(scene, self.output)
+            else:
+                notes = switching.switch(scene, self.output)
+            report_notes(self, notes)
+        return {"FINISHED"}
+
+
+class UMBRA_OT_use_cycles(bpy.types.Operator):
+    bl_idname = "umbra.use_cycles"
+    bl_label = "Switch to Cycles"
+    bl_description = "Choose the render engine Cycles, which the output Cycles Lens needs"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        with reporting_switches(self, scene), engines.switched(scene, "CYCLES"):
+            registry.of(scene).refresh(scene)
         return {"FINISHED"}
 
 
@@ -168,7 +228,8 @@ class UMBRA_OT_foreground(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        added = foreground.set_up(context.scene, context.evaluated_depsgraph_get())
+        with reporting_switches(self, context.scene):
+            added = foreground.set_up(context.scene, context.evaluated_depsgraph_get())
         self.report({"INFO"}, f"In front of the hole: {', '.join(added) or 'nothing new'}.")
         return {"FINISHED"}
 
@@ -185,7 +246,8 @@ class UMBRA_OT_remove_foreground(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        foreground.remove(context.scene)
+        with reporting_switches(self, context.scene):
+            foreground.remove(context.scene)
         return {"FINISHED"}
 
 
@@ -201,6 +263,7 @@ CLASSES = (
     UMBRA_OT_remove_compositor,
     UMBRA_OT_use_star_sky,
     UMBRA_OT_set_output,
+    UMBRA_OT_use_cycles,
     UMBRA_OT_foreground,
     UMBRA_OT_remove_foreground,
 )

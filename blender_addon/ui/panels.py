@@ -23,6 +23,19 @@ def _draw_hole(layout: bpy.types.UILayout, hole: bpy.types.Object) -> None:
         layout.prop(settings, "speed_of_light")
 
 
+def _draw_outputs(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """The choice of the output: buttons, because a property could not report what it has switched."""
+    split = layout.split(factor=0.4)
+    label = split.row()
+    label.alignment = "RIGHT"
+    label.label(text="Output")
+    column = split.column(align=True)
+    now = registry.of(scene)
+    for output in registry.every():
+        button = column.operator("umbra.set_output", text=output.label, depress=output is now)
+        button.output = output.identifier
+
+
 def _draw_lines(layout: bpy.types.UILayout, lines: tuple[status.Line, ...]) -> None:
     column = layout.column(align=True)
     for line in lines:
@@ -42,11 +55,11 @@ class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         scene = context.scene
         hole = _hole(context)
-        if hole is None and scene.umbra.active_hole is None:
+        if hole is None and scene.umbra.active_hole is None and not frame_setup.holes(scene):
             layout.operator("umbra.add_black_hole", text="Add Black Hole", icon="ADD")
         else:
             layout.prop(scene.umbra, "active_hole")
-            layout.column(align=True).prop(scene.umbra, "output", expand=True)
+            _draw_outputs(layout, scene)
         _draw_lines(layout, status.lines(context))
 
         progress = bake_operators.running()
@@ -99,7 +112,9 @@ class VIEW3D_PT_umbra_maps(UmbraPanel, bpy.types.Panel):
         layout.use_property_split = True
         settings = context.scene.umbra
         layout.prop(settings, "map_folder")
-        layout.prop(settings, "auto_bake")
+        row = layout.row()
+        row.use_property_split = False  # the name is too long beside an empty half
+        row.prop(settings, "auto_bake")
         layout.prop(settings, "supersampling")
         layout.prop(settings, "quality")
         if settings.quality == "CUSTOM":

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators have in common: errors become reports."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from typing import TypeVar
 
 import bpy
 
 from ..core.physics_api import physics
-from ..scene import frame_setup
+from ..outputs import switched
+from ..scene import environment, frame_setup
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -36,6 +38,35 @@ def report_notes(operator: bpy.types.Operator, notes: Iterable[str]) -> None:
     """Report what the artist should know."""
     for note in notes:
         operator.report({"WARNING"}, note)
+
+
+@contextmanager
+def reporting_switches(operator: bpy.types.Operator, scene: bpy.types.Scene) -> Iterator[None]:
+    """Report in one line which settings of a scene a block has changed."""
+    before = switched.state(scene)
+    yield
+    text = switched.sentence(before, switched.state(scene))
+    if text:
+        operator.report({"INFO"}, text)
+
+
+@contextmanager
+def reporting_sky(operator: bpy.types.Operator, scene: bpy.types.Scene) -> Iterator[None]:
+    """Report it where a block chooses an image as the sky because the World shows none."""
+    settings = scene.umbra
+    was_world = settings.environment_source == "WORLD"
+    yield
+    image = settings.environment_image
+    has_changed = was_world and settings.environment_source == "IMAGE"
+    if has_changed and image is not None and environment.world_left_out(scene) is None:
+        why = "The scene has no World" if scene.world is None else f'World "{scene.world.name}" is a plain color'
+        operator.report({"INFO"}, f'{why}: the sky is the image "{image.name}".')
+
+
+def report_missing_camera(operator: bpy.types.Operator, scene: bpy.types.Scene) -> None:
+    """Report it where nothing can be rendered yet for want of a camera."""
+    if scene.camera is None:
+        operator.report({"WARNING"}, "The scene has no camera yet: add one to render the black hole.")
 
 
 def only_one_is_rendered(scene: bpy.types.Scene) -> str:

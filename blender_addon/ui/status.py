@@ -9,11 +9,12 @@ import numpy as np
 
 from ..bake.check import count_baked, is_valid
 from ..bake.request import MapRequest
+from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.shared import drawing
-from ..scene import frame_setup, presence
+from ..scene import frame_setup, instanced_hole, presence
 from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
 
@@ -52,6 +53,10 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
     """The state of the scene's black hole at the current frame."""
     scene = context.scene
     if frame_setup.find_active_hole(scene) is None and scene.umbra.active_hole is None and not frame_setup.holes(scene):
+        try:
+            instanced_hole.check(scene)
+        except SceneError as error:
+            return wrapped(error.for_user(), "ERROR")
         return wrapped("This scene has no black hole.", "INFO")
     if presence.is_absent(scene):
         return wrapped("The black hole is hidden in renders or deleted: pictures show the plain scene.", "INFO")

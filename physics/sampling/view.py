@@ -15,6 +15,7 @@ from ..kerr.critical_curve import all_around, around_hole, edge_angles, edge_fun
 from ..kerr.metric import metric_functions
 from ..kerr.observer import Observer
 from ..kerr.rays import Rays, camera_triad, light_in_fido_frame, rays_from_axes, redshift_vector
+from ..kerr.shadow_outline import as_seen
 from ..numerics.arrays import Array
 from ..numerics.blocks import blocks
 from ..numerics.sphere import spherical_triad
@@ -128,11 +129,5 @@ class View:
 
     def _pixels(self, looking: Array) -> tuple[Array, Array]:
         """Return the map pixels that see what the FIDO sees along `looking` (its triad), shape (n, 3): aberration."""
-        beta, motion = self._observer.beta, np.array(self._observer.direction)
-        along = looking @ motion
-        # Eq. 5 turned round: the component along the motion becomes (cos + beta) / (1 + beta cos).
-        across = looking - along[:, None] * motion
-        seen = math.sqrt(1.0 - beta * beta) * across + (along + beta)[:, None] * motion
-        seen /= (1.0 + beta * along)[:, None]
-        x, y = self._camera.pixels(seen @ self._camera_to_triad.T)
+        x, y = self._camera.pixels(as_seen(self._observer, looking) @ self._camera_to_triad.T)
         return x / self._per_pixel, y / self._per_pixel

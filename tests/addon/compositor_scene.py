@@ -161,6 +161,7 @@ class GroupRenderer:
         warp_map: FloatArray | None = None,
         environment: FloatArray | None = None,
         foreground: FloatArray | None = None,
+        disk: FloatArray | None = None,
         output: str = "Image",
         percentage: int = 100,
         values: Mapping[str, object] | None = None,
@@ -177,6 +178,7 @@ class GroupRenderer:
             "Render": foreground,
             "Sky Levels": levels,
             "Footprint": footprint,
+            "Disk": disk,
         }
         for name, pixels in pictures.items():
             if pixels is not None:

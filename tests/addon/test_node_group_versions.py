@@ -52,6 +52,9 @@ def test_sockets_are_complete_described_and_in_order(node_group: ModuleType) -> 
         "Redshift Brightness",
         "Sky Temperature",
         "Disk",
+        "Depth",
+        "Hole Depth",
+        "Hide Behind",
     ]
     assert [item.name for item in outputs] == ["Image", "Sky", "Shadow", "Redshift"]
     assert all(len(item.description) > 20 for item in inputs + outputs)

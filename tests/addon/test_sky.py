@@ -263,6 +263,15 @@ def for_the_camera(tree: bpy.types.NodeTree) -> None:
     tree.links.new(mix.outputs["Shader"], tree.nodes["World Output"].inputs["Surface"])
 
 
+def emission(tree: bpy.types.NodeTree) -> None:
+    """A picture that shines by Emission, without a Background."""
+    tree.nodes.remove(tree.nodes["Background"])
+    node = tree.nodes.new("ShaderNodeEmission")
+    node.inputs["Strength"].default_value = 1.4
+    tree.links.new(textured(tree).outputs["Color"], node.inputs["Color"])
+    tree.links.new(node.outputs["Emission"], tree.nodes["World Output"].inputs["Surface"])
+
+
 WORLDS: dict[str, Callable[[bpy.types.NodeTree], None]] = {
     "hue and saturation": lambda tree: through(tree, "HueSaturation", Saturation=1.6, Value=0.7),
     "gamma": lambda tree: through(tree, "Gamma", Gamma=1.8),
@@ -273,6 +282,7 @@ WORLDS: dict[str, Callable[[bpy.types.NodeTree], None]] = {
     "sky texture": sunless,
     "group": grouped,
     "for the camera": for_the_camera,
+    "emission": emission,
 }
 
 
@@ -356,6 +366,70 @@ def test_a_panorama_is_kept_until_the_world_changes(
     assert environment.read(bpy.context.scene).image.name.startswith("World Panorama")
 
 
+@pytest.mark.parametrize("by", ["keyframes", "driver"])
+def test_a_panorama_is_turned_and_brightened_by_what_the_world_animates(
+    scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, panorama: ModuleType, by: str
+) -> None:
+    """A color node between, and keyframes or a driver of rotation and strength: one panorama serves all frames."""
+    bare(scene, "gamma")
+    tree = scene.world.node_tree
+    mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    texture = next(node for node in tree.nodes if node.type == "TEX_ENVIRONMENT")
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    turn, strength = mapping.inputs["Rotation"], tree.nodes["Background"].inputs["Strength"]
+    for frame, angle in ((1, 0.4), (3, 1.8)):
+        turn.default_value = (0.2, -0.3, angle)
+        turn.keyframe_insert("default_value", frame=frame)
+    if by == "keyframes":
+        for frame, value in ((1, 0.5), (3, 1.5)):
+            strength.default_value = value
+            strength.keyframe_insert("default_value", frame=frame)
+    else:
+        strength.driver_add("default_value").driver.expression = "0.2 * frame"
+    scene.frame_set(1)
+    add_hole(scene, sky=False, mass_scale=TINY)
+    assert scene.umbra.environment_source == "WORLD"
+    images = set(bpy.data.images)
+    seen = []
+    for frame in (1, 3):
+        scene.frame_set(frame)
+        ours = render(scene, tmp_path / "ours.exr", exr)[..., :3]
+        bpy.ops.umbra.remove_compositor()
+        seen.append(render(scene, tmp_path / "own.exr", exr)[..., :3])
+        np.testing.assert_allclose(ours, seen[-1], atol=2 * TOLERANCE)
+        bpy.ops.umbra.setup_compositor()
+    assert np.abs(seen[1] - seen[0]).max() > 0.05
+    assert {each for each in bpy.data.images if each.name.startswith("World Panorama")} <= images
+
+
+def test_what_only_turns_a_part_of_the_world_is_not_followed(
+    scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
+) -> None:
+    bare(scene, "hue and saturation")
+    tree, nodes = scene.world.node_tree, scene.world.node_tree.nodes
+    followed = addon_module("scene.followed")
+    assert followed.of(scene.world, nodes["World Output"]).rotation is None  # nothing turns it
+    mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
+    texture = next(node for node in nodes if node.type == "TEX_ENVIRONMENT")
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    found = followed.of(scene.world, nodes["World Output"])
+    assert (found.rotation.socket, found.strength.socket) == (
+        mapping.inputs["Rotation"],
+        nodes["Background"].inputs["Strength"],
+    )
+    gradient, hue = nodes.new("ShaderNodeTexGradient"), next(node for node in nodes if node.type == "HUE_SAT")
+    tree.links.new(gradient.outputs["Color"], hue.inputs["Value"])
+    assert followed.of(scene.world, nodes["World Output"]).rotation is None
+    tree.links.new(coordinates.outputs["Generated"], gradient.inputs["Vector"])
+    assert followed.of(scene.world, nodes["World Output"]).rotation is None
+    tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
+    assert followed.of(scene.world, nodes["World Output"]).rotation is not None
+    mapping.inputs["Scale"].default_value = (1.0, 2.0, 1.0)
+    assert followed.of(scene.world, nodes["World Output"]).rotation is None
+
+
 @pytest.mark.parametrize("kind", ["animated", "camera", "tiles"])
 def test_a_world_that_no_image_can_show_is_left_out_with_the_reason(
     scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str], addon_module: Callable[[str], ModuleType], kind: str
@@ -408,6 +482,32 @@ def test_alpha_is_as_in_blenders_world(
     add_hole(scene, sky=False, mass_scale=TINY)
     np.testing.assert_allclose(corner(render(scene, tmp_path / "ours.exr", exr)), own, rtol=2e-3)
     assert own[0] == pytest.approx(0.133, abs=2e-3)
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.5])
+def test_alpha_in_a_sequence_is_said(
+    scene: bpy.types.Scene,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    addon_module: Callable[[str], ModuleType],
+    alpha: float,
+) -> None:
+    """By Add, and by the panel from then on; the file is not left among the images."""
+    for frame in (1, 2):
+        made = bpy.data.images.new("Half", 16, 8, alpha=True)
+        made.pixels.foreach_set(np.tile(np.array((0.8, 0.6, 0.4, alpha), np.float32), 128))
+        made.file_format, made.filepath_raw = "PNG", str(tmp_path / f"half_{frame:04d}.png")
+        made.save()
+        bpy.data.images.remove(made)
+    image = bpy.data.images.load(str(tmp_path / "half_0001.png"))
+    image.source = "SEQUENCE"
+    use_sky(scene, image)
+    add_hole(scene, sky=False)
+    assert ("has alpha, which darkens a sequence less" in "".join(capfd.readouterr())) == (alpha < 1.0)
+    lines = addon_module("ui.status").lines(bpy.context)
+    assert ("has alpha" in " ".join(line.text for line in lines)) == (alpha < 1.0)
+    assert sum(each.name.startswith("half") for each in bpy.data.images) == 1
+    assert scene.umbra.environment_image == image
 
 
 def panorama_of(tree: bpy.types.NodeTree, image: bpy.types.Image) -> bpy.types.Node:

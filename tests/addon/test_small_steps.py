@@ -7,7 +7,7 @@ from types import ModuleType
 
 import bpy
 import pytest
-from small_scene import add_hole, compositor
+from small_scene import add_hole, compositor, links_of
 
 Places = Callable[[], list[tuple[float, ...]]]
 
@@ -61,6 +61,68 @@ def test_a_file_output_of_the_raw_render_stays_raw(scene: bpy.types.Scene) -> No
     bpy.ops.umbra.set_output(output="COMPOSITOR")
     (link,) = raw.inputs[0].links
     assert link.from_node.type == "R_LAYERS"
+
+
+def test_a_file_output_that_was_there_stays_raw(scene: bpy.types.Scene) -> None:
+    """The render feeds a file, directly and through a node, and the picture: only the picture gets the hole."""
+    tree = compositor(scene)
+    layer = next(node for node in tree.nodes if node.type == "R_LAYERS")
+    blur, raw = tree.nodes.new("CompositorNodeBlur"), tree.nodes.new("CompositorNodeOutputFile")
+    if bpy.app.version >= (5, 0):
+        for name in ("Raw", "Blurred"):
+            raw.file_output_items.new("RGBA", name)
+    else:
+        raw.file_slots.new("Blurred")
+    tree.links.new(layer.outputs["Image"], raw.inputs[0])
+    tree.links.new(layer.outputs["Image"], blur.inputs["Image"])
+    tree.links.new(blur.outputs["Image"], raw.inputs[1])
+    before = links_of(tree)
+    add_hole(scene)
+    added, gone = links_of(tree) - before, before - links_of(tree)
+    assert len(gone) == 1  # to the picture
+    assert raw.inputs[0].links[0].from_node == layer
+    assert blur.inputs["Image"].links[0].from_node == layer
+    assert not any(target in {raw.name, blur.name} for _, _, target, _ in added)
+    bpy.ops.umbra.remove_compositor()
+    assert links_of(tree) == before
+
+
+# --- what is switched -----------------------------------------------------------------------------
+
+
+def said(capfd: pytest.CaptureFixture[str]) -> str:
+    """What was reported as switched since the last time, of what any machine switches."""
+    (line,) = (each for each in capfd.readouterr().out.splitlines() if "Switched: " in each)
+    return line.split("Switched: ")[1]
+
+
+def test_what_is_switched_is_said_in_one_line(
+    scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """By Add, by each change of the output, by a script's as well; and what was so already is not mentioned."""
+    render = scene.render
+    render.use_lock_interface = True
+    capfd.readouterr()
+    add_hole(scene)
+    line = said(capfd)
+    assert "Film > Transparent on" in line
+    assert "Compositor Precision Full" in line
+    assert "Lock Interface" not in line
+    assert "View" not in line
+    assert ("Use Nodes on" in line) == (bpy.app.version < (5, 0))
+    bpy.ops.umbra.set_output(output="CYCLES_LENS")
+    line = said(capfd)
+    assert "Film > Transparent off" in line
+    assert 'Camera "Camera" > Type Custom' in line
+    assert 'World "Test Sky (sky)"' in line
+    scene.umbra.output = "COMPOSITOR"
+    line = said(capfd)
+    assert 'World "World"' in line
+    assert 'Camera "Camera" > Type Perspective' in line
+    bpy.ops.umbra.setup_compositor()  # there already
+    assert "Switched" not in capfd.readouterr().out
+    bpy.ops.umbra.remove_compositor()
+    assert "Film > Transparent off" in said(capfd)
 
 
 def hide_with_collection(scene: bpy.types.Scene, setting: str) -> None:

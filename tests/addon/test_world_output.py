@@ -270,7 +270,7 @@ def test_any_world_is_bent(scene, physics, tmp_path) -> None:
 
 def test_a_world_that_cannot_be_bent_is_said_and_left_alone(scene) -> None:
     scene.world.node_tree.nodes.clear()
-    with pytest.raises(RuntimeError, match="has no Background node"):
+    with pytest.raises(RuntimeError, match="has no Background or Emission node"):
         switch()
     assert scene.umbra.output == "COMPOSITOR"
     assert len(bpy.data.worlds) == 1

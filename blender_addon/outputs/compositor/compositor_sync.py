@@ -16,7 +16,7 @@ from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree, takes_sky_from_settings
 from ..shared.map_images import NO_MAP, plain_map, read_sequence
-from . import disk, sky_filter
+from . import depth, disk, sky_filter
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
 
@@ -56,6 +56,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
         sky_filter.ensure_nodes(setup)
     disk_light.refresh(scene, frame_setup.find_active_hole(scene))
     disk.refresh(scene)
+    depth.refresh(scene)
     try:
         point_at_maps(scene)
     except SceneError as error:

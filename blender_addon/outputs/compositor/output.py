@@ -11,8 +11,9 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment, panorama, sky_frames
+from ...scene import environment, frame_setup, instanced_hole, panorama, sky_frames
 from ...scene.frame_setup import FrameSetup
+from ...scene.shutter import Motion
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import (
@@ -26,9 +27,15 @@ from ..shared.compositor_tree import (
 )
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, disk, panel, sky_filter
+from . import compositing, compositor_sync, depth, disk, objects_behind, panel, sky_filter
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
+MOTION_BLUR = "Motion Blur is on: where camera or hole move, objects are blurred; sky, shadow and disk stay sharp."
+DEPTH_OF_FIELD = "Depth of Field is on: objects are blurred; sky, shadow and disk stay sharp."
+NO_DEPTH = (
+    "Hide Behind the Hole has no depth pass: connect the Image of a Render Layers node to Render of the node Umbra "
+    "Black Hole, and press Update Compositor."
+)
 
 
 class CompositorOutput(Output):
@@ -94,6 +101,8 @@ class CompositorOutput(Output):
     def set_up(self, scene: bpy.types.Scene) -> list[str]:
         """Put the black hole into the compositor, or bring it up to date there; return what the artist should know.
 
+        A hole that came from another file, where no set-up is yet, is shown like one that was added.
+
         Raises
         ------
         SceneError
@@ -103,7 +112,14 @@ class CompositorOutput(Output):
             raise SceneError(
                 "This scene's output is another one: choose Output: Compositor first.", code="compositor.other-output"
             )
-        return _prepare(scene) + compositing.set_up(scene)
+        has_holes = bool(frame_setup.holes(scene))
+        if not has_holes:
+            instanced_hole.check(scene)
+        if has_holes and find_setup(scene) is None:
+            if scene.umbra.active_hole is None:
+                scene.umbra.active_hole = frame_setup.find_active_hole(scene)
+            return self.on_hole_added(scene)
+        return _prepare(scene) + compositing.set_up(scene) + _alpha_note(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
         """Return whether anything of the set-up is in the compositor."""
@@ -121,6 +137,9 @@ class CompositorOutput(Output):
 
     def on_hole_added(self, scene: bpy.types.Scene) -> list[str]:
         """Choose the star sky where the World has none that can be shown, and set the compositor up."""
+        tree = find_tree(scene)
+        if tree is not None:
+            check_shared(scene, tree)
         settings = scene.umbra
         stars = False
         notes: list[str] = []
@@ -137,7 +156,7 @@ class CompositorOutput(Output):
         notes += compositing.set_up(scene)
         if stars:
             self.brighten_stars(scene)
-        return notes
+        return notes + _alpha_note(scene)
 
     def brighten_stars(self, scene: bpy.types.Scene) -> None:
         """Brighten the star sky, unless the artist has set an exposure."""
@@ -181,6 +200,7 @@ class CompositorOutput(Output):
                 f'the node group "{black_hole_group.GROUP_NAME}" was damaged or of another version, and is built anew.'
             )
         check_linked(scene)
+        depth.refresh(scene)
         compositor_sync.sync_sky(scene)
         self.prepare_files(scene, may_bake=scene.umbra.auto_bake)
 
@@ -248,12 +268,22 @@ class CompositorOutput(Output):
         return None if setup is None else setup.group
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
-        """Say where the compositor is not set up."""
+        """Say where the compositor is not set up, and what it draws unbent or sharp."""
         setup = find_setup(scene)
-        if setup is not None:
-            said = (environment.world_left_out(scene), sky_filter.notice(scene, setup))
-            return [Notice(text) for text in said if text is not None]
-        return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        if setup is None:
+            return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
+        found = [environment.world_left_out(scene), environment.alpha_note(scene, may_load=False)]
+        found.append(sky_filter.notice(scene, setup))
+        if scene.umbra.hide_behind and not depth.is_in_use(scene):
+            found.append(NO_DEPTH)
+        behind = objects_behind.find(scene, depsgraph)
+        if behind:
+            found.append(objects_behind.sentence(behind))
+        if frame.motion is not Motion.NONE:
+            found.append(MOTION_BLUR)
+        if frame.aperture > 0.0:
+            found.append(DEPTH_OF_FIELD)
+        return [Notice(each) for each in found if each is not None]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
         """Return why the sky cannot be read, unless it is the artist's own nodes."""
@@ -275,6 +305,11 @@ def _leave_world(scene: bpy.types.Scene, error: SceneError) -> list[str]:
     """Choose an image in place of a World that cannot be the sky, and say why."""
     environment.leave_world(scene)
     return [f"The World is not the sky of the black hole. {error.for_user()}"]
+
+
+def _alpha_note(scene: bpy.types.Scene) -> list[str]:
+    note = environment.alpha_note(scene, may_load=True)
+    return [] if note is None else [note]
 
 
 def _prepare(scene: bpy.types.Scene) -> list[str]:

@@ -28,5 +28,6 @@ def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene, problem: str | None
     column.active = settings.environment_source == "IMAGE"
     draw_inputs(column, setup.group, PLACEMENT_CONTROLS)
     draw_inputs(layout, setup.group, LOOK_CONTROLS)
+    layout.prop(settings, "hide_behind")
     layout.operator("umbra.setup_compositor", text="Update Compositor", icon="FILE_REFRESH")
     layout.operator("umbra.remove_compositor", icon="X")

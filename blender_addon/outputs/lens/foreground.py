@@ -41,7 +41,9 @@ def set_up(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
     SceneError
         There is nothing nearer than the hole, or no camera.
     """
-    nearer = lens_objects.place(scene, depsgraph, frame_setup.read(scene, depsgraph, False, lens_sync.TRAITS)).nearer
+    nearer = lens_objects.place(
+        scene, depsgraph, frame_setup.read(scene, depsgraph, False, lens_sync.LIVE_TRAITS)
+    ).nearer
     settings = scene.umbra
     if settings.foreground is None and not nearer:
         raise SceneError(

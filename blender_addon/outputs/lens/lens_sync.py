@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carry a frame into the camera that bends its rays: for the viewport at once, for a render with its exit map."""
 
+import contextlib
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from ...settings.scene_properties import EXIT_MAP
 from . import lens_camera, lens_shader
 
 # A camera that bends its rays can render a part of the picture.
-TRAITS = frame_setup.Traits(crops=True)
+TRAITS = frame_setup.Traits(crops=True, blurs=False)
+# Of the viewport, which does not blur.
+LIVE_TRAITS = replace(TRAITS, blurs=True)
 
 # A picture without anything in it: the parameters are not valid.
 BROKEN = {"broken": 1}
@@ -110,6 +113,7 @@ def show_live(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     try:
         check(scene)
         camera_of(scene)
-        show(scene, frame_setup.read(scene, depsgraph, False, TRAITS))
+        show(scene, frame_setup.read(scene, depsgraph, False, LIVE_TRAITS))
     except physics.BlackHoleError:  # the panel and the render say why
-        break_camera(scene)
+        with contextlib.suppress(physics.BlackHoleError):  # a Blender without OSL
+            break_camera(scene)

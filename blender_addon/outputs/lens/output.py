@@ -39,6 +39,7 @@ class LensOutput(Output):
     label = "Cycles Lens"
     description = "The camera's own rays are bent: objects, lights, volumes and World are all seen through the hole"
     traits = lens_sync.TRAITS
+    engine = "CYCLES"
     settings_label = "Lens"
 
     # --- setting a scene up -----------------------------------------------------------------------
@@ -203,7 +204,8 @@ class LensOutput(Output):
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
         """Say what the picture lacks."""
-        lens_sync.check(scene)
+        if scene.render.engine != self.engine:
+            return [Notice("The Cycles Lens needs the render engine Cycles.", "ERROR", "umbra.use_cycles")]
         found = []
         problem = lens_shader.device_problem(scene)
         if problem is not None:

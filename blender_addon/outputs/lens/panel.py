@@ -13,6 +13,7 @@ def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     layout.prop(settings, "lens_rays")
     layout.prop(settings, "sphere_radius")
     draw_sky_choice(layout, settings)
+    layout.use_property_split = False  # the names are too long to stand beside their fields
     for name, socket in lens_sky.controls(scene).items():
         layout.prop(socket, "default_value", text=name)
     layout.prop(settings, "redshift_color")

@@ -1,29 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pieces of panels: sentences that are wrapped to the panel's width, and the inputs of nodes."""
 
-import textwrap
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
+import blf
 import bpy
 
-# How many characters a line of a panel shows: its width less margins and icon, over a character's mean width, in
-# pixels at an interface scale of 1.
-MARGIN, CHARACTER_WIDTH = 50.0, 6.0
-SHORTEST_LINE, ORDINARY_LINE = 20, 40
-
-
-def _line_width() -> int:
-    region = bpy.context.region
-    if region is None:
-        return ORDINARY_LINE
-    scale = bpy.context.preferences.system.ui_scale
-    return max(int((region.width / scale - MARGIN) / CHARACTER_WIDTH), SHORTEST_LINE)
+# Pixels at an interface scale of 1: the sidebar as Blender first shows it, what of that a line of text does not have
+# (tabs, margins and icon), and the narrowest line.
+SIDEBAR, MARGIN, NARROWEST = 292.0, 82.0, 120.0
 
 
 def wrapped(text: str) -> list[str]:
     """Return a sentence as lines that fit the panel being drawn."""
-    return textwrap.wrap(text, _line_width())
+    region, scale = bpy.context.region, _scale()
+    width = SIDEBAR * scale if region is None else region.width
+    return fill(text, max(width - MARGIN * scale, NARROWEST * scale), width_of)
+
+
+def _scale() -> float:
+    return bpy.context.preferences.system.ui_scale or 1.0  # 0 before a window was drawn
+
+
+def width_of(text: str) -> float:
+    """Return the width of a text in the interface's font, pixels."""
+    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points * _scale())
+    width: float = blf.dimensions(0, text)[0]
+    return width
+
+
+def fill(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
+    """Return a text as lines no wider than a width, broken between words, and within those that are wider alone."""
+    lines = [""]
+    for word in text.split():
+        joined = f"{lines[-1]} {word}".lstrip()
+        if measure(joined) <= width:
+            lines[-1] = joined
+            continue
+        if lines[-1]:
+            lines.append("")
+        for character in word:
+            if lines[-1] and measure(lines[-1] + character) > width:
+                lines.append("")
+            lines[-1] += character
+    return lines
 
 
 def draw_problem(layout: bpy.types.UILayout, text: str, icon: str = "ERROR") -> None:

@@ -2,8 +2,8 @@
 """Put a lensed copy of a scene's World in its place, and the World itself back.
 
 The artist's World is never touched, so that what comes back is exactly what was there. The copy keeps all of its
-nodes: the group's Vector takes the place of Generated coordinates, and each Background's color passes by the group's
-Tint and Fault.
+nodes: the group's Vector takes the place of Generated coordinates, and the color of each Background or Emission passes
+by the group's Tint and Fault.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
 from ...scene import environment, image_world
+from ...scene.node_paths import SHINING
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
@@ -28,8 +29,8 @@ OF_IMAGE, OF_WORLD = "image", "world"
 IMPORTANCE_RESOLUTION = 512
 
 _NO_BACKGROUND = (
-    'World "{}" has no Background node that could be bent: connect one to its output, or choose Sky: Image in the '
-    "Umbra panel."
+    'World "{}" has no Background or Emission node that could be bent: connect one to its output, or choose Sky: Image '
+    "in the Umbra panel."
 )
 
 # Kinds of nodes that look in the ray's direction when their input Vector is not linked.
@@ -87,7 +88,7 @@ def check(scene: bpy.types.Scene) -> None:
             f'Scene "{scene.name}" has no World: add one, or choose Sky: Image in the Umbra panel.', code="sky.no-world"
         )
     uses_nodes = not NODES_ARE_OPTIONAL or world.use_nodes
-    if uses_nodes and not any(node.type == "BACKGROUND" for node in _all_nodes(world.node_tree)):
+    if uses_nodes and not any(node.type in SHINING for node in _all_nodes(world.node_tree)):
         raise SceneError(_NO_BACKGROUND.format(world.name), code="sky.no-background")
 
 
@@ -228,7 +229,7 @@ class _Sources:
 def _insert(world: bpy.types.World) -> bpy.types.Node:
     """Put the group into a World's nodes."""
     tree = world.node_tree
-    if not any(node.type == "BACKGROUND" for node in _all_nodes(tree)):
+    if not any(node.type in SHINING for node in _all_nodes(tree)):
         raise SceneError(_NO_BACKGROUND.format(world.name.removesuffix(" (lensed)")), code="sky.no-background")
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = world_group.new_group()
@@ -247,7 +248,7 @@ def _bend(tree: bpy.types.NodeTree, sources: _Sources, ours: set[str]) -> None:
     for node in nodes:
         if node.type in _LOOK_BY_THEMSELVES and "Vector" in node.inputs and not node.inputs["Vector"].is_linked:
             tree.links.new(sources.vector, node.inputs["Vector"])
-        elif node.type == "BACKGROUND":
+        elif node.type in SHINING:
             _tint(tree, node, sources)
         elif node.type == "GROUP" and node.node_tree is not None:
             _bend_group(tree, node, node.node_tree.copy(), sources)

@@ -12,6 +12,7 @@ from ...core.physics_api import physics
 from ...nodes import world_group
 from ...scene import environment
 from ...scene.frame_setup import FrameSetup, Traits
+from ...scene.shutter import Motion
 from ..protocol import Look, Notice, Output
 from ..shared import sequencer, world_files
 from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group
@@ -19,6 +20,7 @@ from . import lensed_world, panel, world_sync
 from .live import WorldLiveMap
 
 ANOTHER_WORLD = 'Scene "{}" has the output World, but another World was chosen since: set Output: World again.'
+MOTION_BLUR = "Motion Blur is on: the camera's turning blurs the World; its way past the hole, or the hole's, does not."
 NOT_CHECKED = "Check Accuracy knows no world maps: choose Output: Compositor or Cycles Lens, and bake this frame."
 
 
@@ -141,6 +143,8 @@ class WorldOutput(Output):
         except SceneError as error:
             found.append(Notice(error.for_user(), "ERROR"))
         found += [Notice(each) for each in lensed_world.unbent(scene)]
+        if frame.motion is not Motion.NONE:
+            found.append(Notice(MOTION_BLUR))
         return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
