@@ -53,7 +53,8 @@ GROUP_VERSION = 4
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
-"""Key of the group that does not filter; for the others the number of looks is appended."""
+LOOKS_KEY = "umbra_looks"
+"""Custom property of a group: its number of looks."""
 
 RENDER = SocketSpec(
     "Render",
@@ -200,9 +201,9 @@ def group_of(looks: int) -> VersionedGroup:
 
     The compositor evaluates all nodes of a group, needed or not: hence one group per number.
     """
-    name = f"{GROUP_NAME} {looks}" if looks else GROUP_NAME
-    key = f"{VERSION_KEY}_{looks}" if looks else VERSION_KEY
-    return VersionedGroup(name, GROUP_VERSION, key, INPUTS, OUTPUTS, partial(_build, looks))
+    return VersionedGroup(
+        GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, partial(_build, looks), variant=(LOOKS_KEY, looks)
+    )
 
 
 _KINDS = tuple(group_of(choice.value) for choice in physics.SKY_FILTER.choices)
@@ -249,13 +250,20 @@ def use(node: bpy.types.Node, looks: int) -> None:
     looks : int
         0 or one of the choices of `physics.SKY_FILTER`.
     """
-    group = ensure_group(looks)
-    if node.node_tree == group:
-        return
     former = node.node_tree
     kind = kind_of(former)
     if former is not None and kind is not None and former.library is None:
+        if looks:
+            filtered_sky.LOOK.ensure()
+        present = group_of(looks).find()
+        if former.users == 1 and present in (None, former):
+            group_of(looks).ensure(former)  # in place: nobody else uses it
+            remove_unused()
+            return
         kind.ensure(former)  # now its inputs are those of the other group
+    group = ensure_group(looks)
+    if former == group:
+        return
     links = node.id_data.links
     values = {socket.name: _copied(socket.default_value) for socket in node.inputs}
     origins = {socket.name: socket.links[0].from_socket for socket in node.inputs if socket.is_linked}
