@@ -14,7 +14,7 @@ from ...scene import environment, frame_setup, sky_frames
 from ...scene.node_paths import Place
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import Setup, find_setup, find_tree
-from ..shared.map_images import NO_MAP, plain_map, read_sequence
+from ..shared.map_images import NO_MAP, file_image, plain_map, read_sequence
 from . import depth, disk
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
@@ -100,13 +100,18 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:
     """Let Blender read the maps anew from their files."""
-    setup = find_setup(scene)
-    if setup is not None and setup.map is not None and setup.map.image is not None:
-        setup.map.image.reload()
-    tree = find_tree(scene)
-    for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
-        if node.image is not None:
-            node.image.reload()
+    for node in map_nodes(scene):
+        image = file_image(node)
+        if image is not None:
+            image.reload()
+            image.update_tag()  # else the viewport's compositor keeps what it has
+
+
+def map_nodes(scene: bpy.types.Scene) -> list[bpy.types.Node]:
+    """Return the nodes that read maps: the warp map's first, if it is there, then those of the disk's passes."""
+    setup, tree = find_setup(scene), find_tree(scene)
+    passes = [] if tree is None else [node for node, _crossing in disk_sync.passes_of(tree)]
+    return passes if setup is None or setup.map is None else [setup.map, *passes]
 
 
 def takes_sky_from_settings(setup: Setup) -> bool:

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A map that bends nothing, for a scene whose hole is hidden or deleted; and cameras with fewer pixels."""
+
+import math
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.physics_api import physics
+from ..outputs import registry
+from ..scene import frame_setup
+
+Camera = physics.PerspectiveCamera | physics.PanoramaCamera
+
+
+def shrunk(camera: Camera, pixels: int) -> Camera:
+    """Return the camera that sees the same in at most so many pixels, about, of the same aspect."""
+    scale = min(math.sqrt(pixels / (camera.width * camera.height)), 1.0)
+    return camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
+
+
+@dataclass(frozen=True)
+class View:
+    """What a plain map depends on."""
+
+    camera: Camera
+    axes: tuple[float, ...]
+    """The camera's axes in the world, row by row."""
+
+
+def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, pixels: int) -> View:
+    """Return how the scene's camera looks.
+
+    Raises
+    ------
+    SceneError
+        There is no camera, or one that no map can be made for.
+    """
+    camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
+    model = frame_setup.camera_model(camera.data, scene.render, scene.render.engine, registry.of(scene).traits)
+    pose = frame_setup.pose(camera, "The camera", keep_scale=False)
+    return View(shrunk(model, pixels), tuple(float(each) for each in np.ravel(pose.rotation)))
+
+
+def make(view: View) -> "physics.WarpMap":
+    """Return the map: each pixel sees the sky straight ahead, and no disk."""
+    width, height = view.camera.width, view.camera.height
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    direction = view.camera.directions(x, y) @ np.reshape(view.axes, (3, 3)).T
+    theta = np.arccos(np.clip(direction[..., 2], -1.0, 1.0)).astype(np.float32)
+    phi = (np.arctan2(direction[..., 1], direction[..., 0]) % (2.0 * math.pi)).astype(np.float32)
+    one, zero = np.ones_like(theta), np.zeros_like(theta)
+    nothing = physics.DiskPass(zero, zero, zero, zero, {})
+    return physics.WarpMap(theta, phi, one, one, {}, (nothing,) * physics.MOST_CROSSINGS)

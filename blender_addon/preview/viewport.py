@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewport's compositor follows the hole: a small map at once, the full one when things rest.
+
+While a 3D viewport shows a scene through its compositor, each change traces a map of 480 x 270 in Blender's own
+handler, so that map and scene change in one draw; from a timer the hole would lag behind its objects. When nothing has
+changed for a while, the files of the frame take its place if they are up to date, else a map in memory of the render's
+size, with the disk's passes, traced in slices. A viewport is noticed when it is drawn. Nothing here runs without a
+window or during a render, and files, renders and undo steps are given the nodes as they are without it.
+"""
+
+import enum
+import math
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..bake import check
+from ..bake.request import MapRequest
+from ..core.physics_api import physics
+from ..core.session import SESSION, Life
+from ..outputs import frames, registry
+from ..outputs.protocol import ViewportMaps
+from ..scene import frame_setup, presence, stepping
+from ..scene.frame_setup import FrameSetup
+from ..settings.hole_properties import CAMERA_ANIMATION
+from ..settings.scene_properties import ACCURACIES
+from . import live_preview, plain_map, views
+
+# Pixels of the map that follows, and at the most of the one that takes its place.
+DRAFT_PIXELS, FULL_PIXELS = 480 * 270, 1920 * 1080
+# Seconds without a change after which things rest.
+REST = 0.3
+# Seconds that one slice of work may take, and between two of them.
+BUDGET, PAUSE = 0.05, 0.001
+
+
+class Shows(enum.Enum):
+    """What a scene's picture in the viewport is made from."""
+
+    NOTHING = enum.auto()
+    """Not known yet: what it was made from before."""
+    FAILED = enum.auto()
+    """No map: it is magenta."""
+    FILES = enum.auto()
+    DRAFT = enum.auto()
+    FULL = enum.auto()
+    PLAIN = enum.auto()
+    """A map that bends nothing: the hole is hidden or deleted."""
+
+
+@dataclass
+class State:
+    """What the viewport shows of one scene."""
+
+    shows: Shows = Shows.NOTHING
+    wanted: object = None
+    """What the current frame's picture is made from."""
+    traced: object = None
+    """What the map in memory was made from."""
+    frame: FrameSetup | None = None
+    changed_at: float = 0.0
+    steps: Generator[float, None, Any] | None = None
+    """The full map in the making."""
+    stamps: dict[Path, object] | None = None
+    """The files, as Blender has read them."""
+    told: Shows = Shows.NOTHING
+    """What the panel says."""
+    cost: float = 0.0
+    """Seconds of the main thread for the last change that was followed."""
+
+
+_states = SESSION.per_scene(State, Life.FILE)
+
+
+def state(scene: bpy.types.Scene) -> State | None:
+    """Return what the viewport shows of a scene; None where no viewport shows its compositor."""
+    return _states.find(scene)
+
+
+# --- what calls for work --------------------------------------------------------------------------
+
+
+def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Something in the scene has changed, or its frame: show it in the same draw."""
+    now = _states.find(scene)
+    if now is None or not live_preview.can_run() or stepping.is_stepping.now:
+        return
+    shown_in = views.spaces_of(scene)
+    if not shown_in:
+        _wake()  # the timer clears up
+    elif any(window.view_layer.name == depsgraph.view_layer.name for window, _space in shown_in):
+        _follow(scene, now, depsgraph)
+
+
+def on_draw() -> None:
+    """A viewport is drawn: look after its scene, if it shows the compositor and nobody does yet."""
+    context = bpy.context
+    if context.scene is not None and views.shows_composite(context.space_data):
+        notice(context.scene)
+
+
+def notice(scene: bpy.types.Scene) -> None:
+    """Begin to follow a scene that a viewport shows."""
+    maps = registry.of(scene).viewport
+    if _states.find(scene) is None and live_preview.can_run() and maps is not None and maps.can_show(scene):
+        _states.of(scene)
+        _wake()
+
+
+def start_again() -> None:
+    """Look at all scenes again: after undo or a render, or when a file was opened."""
+    for scene, now in _states.items():
+        _states.put(scene, State(stamps=now.stamps, told=now.told))
+        _wake()
+
+
+def show_files() -> None:
+    """Let all scenes read the files of their frames, as a file that is saved or a render should have it."""
+    for scene in bpy.data.scenes:
+        maps = registry.of(scene).viewport
+        if scene.library is None and maps is not None and maps.is_shown(scene):
+            maps.show_files(scene)
+
+
+def show_again() -> None:
+    """The file is saved: show what was shown before."""
+    for scene, now in _states.items():
+        maps = registry.of(scene).viewport
+        if maps is not None and now.shows in _IN_MEMORY and live_preview.can_run():
+            maps.show_again(scene)
+
+
+def drop() -> None:
+    """Let all scenes read their files, and free all maps in memory."""
+    for scene in bpy.data.scenes:
+        maps = registry.of(scene).viewport
+        if scene.library is None and maps is not None:
+            maps.drop(scene)
+
+
+def forget() -> None:
+    """Drop everything: another file was opened, or the add-on is disabled."""
+    _states.clear()
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+
+
+def _wake() -> None:
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=0.0)
+
+
+# --- following ------------------------------------------------------------------------------------
+
+_IN_MEMORY = (Shows.DRAFT, Shows.FULL, Shows.PLAIN)
+
+
+def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) -> None:
+    """Show the frame at which the dependency graph stands."""
+    maps = registry.of(scene).viewport
+    if maps is None or not maps.can_show(scene):
+        _states.drop(scene)
+        return
+    began = time.thread_time()
+    try:
+        if presence.is_absent(scene):
+            _show_plain(scene, now, maps, depsgraph)
+            return
+        frame = frames.read(scene, depsgraph, False)
+        if frame.parameters == now.wanted and (now.shows in _IN_MEMORY) == maps.is_shown(scene):
+            return
+        _show_frame(scene, now, maps, frame)
+        now.cost = time.thread_time() - began
+    except physics.BlackHoleError:  # the panel says it
+        maps.show_nothing(scene)
+        now.shows, now.wanted, now.frame, now.steps = Shows.FAILED, None, None, None
+
+
+def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: FrameSetup) -> None:
+    """Show the files where they are up to date, else a small map."""
+    same = frame.parameters == now.wanted
+    moved_on = now.frame is None or now.frame.frame != frame.frame
+    may_be_baked = moved_on or same or now.shows is not Shows.DRAFT
+    now.wanted, now.frame = frame.parameters, frame
+    if may_be_baked and _show_files(scene, now, maps):
+        return
+    draft = draft_of(frame.parameters)
+    if same and now.shows in _IN_MEMORY and maps.show_again(scene):
+        return  # a change of settings had given the nodes their files
+    if now.shows is Shows.FAILED:
+        maps.show_files(scene)  # those of the disk, until things rest
+    if draft != now.traced or now.shows is not Shows.DRAFT:
+        maps.show(scene, physics.bake(draft))
+    now.shows, now.traced, now.steps = Shows.DRAFT, draft, None
+    now.changed_at = time.perf_counter()
+    _wake()
+
+
+def _show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgraph: bpy.types.Depsgraph) -> None:
+    wanted = plain_map.read(scene, depsgraph, DRAFT_PIXELS)
+    if wanted != now.wanted or not maps.is_shown(scene):
+        maps.show(scene, plain_map.make(wanted))
+    now.shows, now.wanted, now.frame, now.steps = Shows.PLAIN, wanted, None, None
+
+
+def _show_files(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:
+    """Show the current frame's files; return False where they are missing or out of date."""
+    assert now.frame is not None
+    requests = _requests(scene, now.frame)
+    if not requests or not all(check.is_valid(each, thorough=False) for each in requests):
+        return False
+    stamps = {path: stamp for each in requests for path, stamp in check.stamps(each).items()}
+    known = now.stamps
+    if known is None or any(known.get(path, stamp) != stamp for path, stamp in stamps.items()):
+        registry.of(scene).forget_loaded_maps(scene)
+    now.stamps = {**(known or {}), **stamps}
+    if now.shows is not Shows.FILES or maps.is_shown(scene):
+        maps.show_files(scene)
+    now.shows, now.steps = Shows.FILES, None
+    return True
+
+
+def _requests(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+    """Return the maps of a frame; of a camera whose velocity is measured, with that of the file."""
+    try:
+        requests = frames.requests_of(scene, frame)
+        if frame_setup.active_hole(scene).umbra.motion != CAMERA_ANIMATION:
+            return requests
+        return [replace(each, parameters=_with_velocity_of_file(each)) for each in requests]
+    except physics.BlackHoleError:
+        return []
+
+
+def _with_velocity_of_file(wanted: MapRequest) -> "physics.WarpMapParameters":
+    made = wanted.kind.format.read_metadata(wanted.path)["parameters"]
+    return replace(wanted.parameters, velocity=physics.WarpMapParameters.from_metadata(made).velocity)
+
+
+# --- what is traced -------------------------------------------------------------------------------
+
+
+def draft_of(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
+    """Return what the small map of a frame is made from."""
+    return _of_size(parameters, "DRAFT", DRAFT_PIXELS, disk=None)
+
+
+def full_of(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
+    """Return what the full map of a frame is made from, where its files are not up to date."""
+    return _of_size(parameters, "STANDARD", FULL_PIXELS, disk=parameters.disk)
+
+
+def _of_size(
+    parameters: "physics.WarpMapParameters", accuracy: str, pixels: int, disk: "physics.Disk | None"
+) -> "physics.WarpMapParameters":
+    tolerance, interpolation = ACCURACIES[accuracy]
+    return replace(
+        parameters,
+        camera=plain_map.shrunk(parameters.camera, pixels),
+        supersampling=1,
+        tolerance=tolerance,
+        interpolation=interpolation,
+        method=physics.DEFAULT_METHOD,
+        disk=disk,
+    )
+
+
+# --- when things rest -----------------------------------------------------------------------------
+
+
+def _tick() -> float | None:
+    return advance(BUDGET)
+
+
+def advance(budget: float) -> float | None:
+    """Work for about `budget` seconds; return after how many seconds to go on, None when all is done."""
+    if not live_preview.can_run():
+        return None
+    end = time.perf_counter() + budget
+    waits: list[float] = []
+    for scene, now in _states.items():
+        maps = registry.of(scene).viewport
+        shown_in = views.spaces_of(scene)
+        if maps is None or not maps.can_show(scene) or not shown_in:
+            _states.drop(scene)
+            if maps is not None and scene.library is None:
+                maps.drop(scene)
+            continue
+        if now.shows is Shows.NOTHING:
+            layer = shown_in[0][0].view_layer
+            layer.update()
+            _follow(scene, now, layer.depsgraph)
+        if now.shows is Shows.DRAFT:
+            waits.append(_settle(scene, now, maps, end))
+        if now.told is not now.shows:
+            now.told = now.shows
+            live_preview.redraw()
+    waits = [each for each in waits if math.isfinite(each)]
+    return min(waits) if waits else None
+
+
+def _settle(scene: bpy.types.Scene, now: State, maps: ViewportMaps, end: float) -> float:
+    """Put the full map in the small one's place; return in how many seconds there is more to do."""
+    left = now.changed_at + REST - time.perf_counter()
+    if left > 0.0:
+        return left
+    assert now.frame is not None
+    if now.steps is None:
+        if _show_files(scene, now, maps):
+            return math.inf
+        now.steps = physics.bake_steps(full_of(now.frame.parameters))
+    try:
+        while time.perf_counter() < end:
+            next(now.steps)
+    except StopIteration as done:
+        maps.show(scene, done.value)
+        now.shows, now.traced, now.steps = Shows.FULL, None, None
+        return math.inf
+    except physics.BlackHoleError:  # a disk that is impossible: the panel says it
+        now.steps, now.changed_at = None, math.inf
+        return math.inf
+    return PAUSE
+
+
+# --- registration ---------------------------------------------------------------------------------
+
+_drawing: list[object] = []
+
+
+def register() -> None:
+    """Notice viewports when they are drawn."""
+    if not bpy.app.background:
+        _drawing.append(bpy.types.SpaceView3D.draw_handler_add(on_draw, (), "WINDOW", "PRE_VIEW"))
+
+
+def unregister() -> None:
+    """Give all nodes back to their files."""
+    while _drawing:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
+    drop()
+    forget()
