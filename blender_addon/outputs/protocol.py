@@ -72,6 +72,9 @@ class ViewportMaps(Protocol):
     def show(self, scene: bpy.types.Scene, made: "physics.WarpMap") -> None:
         """Show a map, with the passes of its disk if it has any; those of a disk that it lacks stay as they are."""
 
+    def has_disk(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene reads all passes of its disk from memory, of whatever frame they are."""
+
     def show_again(self, scene: bpy.types.Scene) -> bool:
         """Show the map in memory once more, after the scene was given its files; return False if there is none."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map that bends nothing, for a scene whose hole is hidden or deleted; and cameras with fewer pixels."""
+"""A map that bends nothing, for a scene whose hole is hidden or deleted."""
 
 import math
 from dataclasses import dataclass
@@ -10,14 +10,7 @@ import numpy as np
 from ..core.physics_api import physics
 from ..outputs import registry
 from ..scene import frame_setup
-
-Camera = physics.PerspectiveCamera | physics.PanoramaCamera
-
-
-def shrunk(camera: Camera, pixels: int) -> Camera:
-    """Return the camera that sees the same in at most so many pixels, about, of the same aspect."""
-    scale = min(math.sqrt(pixels / (camera.width * camera.height)), 1.0)
-    return camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
+from .small_maps import SMALL_PIXELS, Camera, shrunk
 
 
 @dataclass(frozen=True)
@@ -29,7 +22,7 @@ class View:
     """The camera's axes in the world, row by row."""
 
 
-def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, pixels: int) -> View:
+def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> View:
     """Return how the scene's camera looks.
 
     Raises
@@ -40,7 +33,7 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, pixels: int) ->
     camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
     model = frame_setup.camera_model(camera.data, scene.render, scene.render.engine, registry.of(scene).traits)
     pose = frame_setup.pose(camera, "The camera", keep_scale=False)
-    return View(shrunk(model, pixels), tuple(float(each) for each in np.ravel(pose.rotation)))
+    return View(shrunk(model, SMALL_PIXELS), tuple(float(each) for each in np.ravel(pose.rotation)))
 
 
 def make(view: View) -> "physics.WarpMap":

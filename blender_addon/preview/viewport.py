@@ -2,40 +2,37 @@
 """The viewport's compositor follows the hole: a small map at once, the full one when things rest.
 
 While a 3D viewport shows a scene through its compositor, each change traces a map of 480 x 270 in Blender's own
-handler, so that map and scene change in one draw; from a timer the hole would lag behind its objects. When nothing has
-changed for a while, the files of the frame take its place if they are up to date, else a map in memory of the render's
-size, with the disk's passes, traced in slices. A viewport is noticed when it is drawn. Nothing here runs without a
-window or during a render, and files, renders and undo steps are given the nodes as they are without it.
+handler, so that map and scene change in one draw; from a timer the hole would lag behind its objects. The disk, which
+takes as long again, follows when the change pauses. When nothing has changed for a while, the files of the frame take
+their place if they are up to date, else a map in memory of the render's size, traced in slices.
+
+A viewport is noticed when it is drawn. Nothing here runs without a window or during a render, and renders and saved
+files are given the nodes as they are without it.
 """
 
 import enum
 import math
 import time
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ..bake import check
-from ..bake.request import MapRequest
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.protocol import ViewportMaps
 from ..scene import frame_setup, presence, stepping
 from ..scene.frame_setup import FrameSetup
-from ..settings.hole_properties import CAMERA_ANIMATION
-from ..settings.scene_properties import ACCURACIES
-from . import live_preview, plain_map, views
+from . import live_preview, plain_map, small_maps, views
 
-# Pixels of the map that follows, and at the most of the one that takes its place.
-DRAFT_PIXELS, FULL_PIXELS = 480 * 270, 1920 * 1080
-# Seconds without a change after which things rest.
-REST = 0.3
+# Seconds without a change after which the disk follows, and after which things rest.
+PAUSE_OF_DISK, REST = 0.1, 0.3
 # Seconds that one slice of work may take, and between two of them.
-BUDGET, PAUSE = 0.05, 0.001
+BUDGET, PAUSE = 0.08, 0.001
 
 
 class Shows(enum.Enum):
@@ -46,7 +43,7 @@ class Shows(enum.Enum):
     FAILED = enum.auto()
     """No map: it is magenta."""
     FILES = enum.auto()
-    DRAFT = enum.auto()
+    SMALL = enum.auto()
     FULL = enum.auto()
     PLAIN = enum.auto()
     """A map that bends nothing: the hole is hidden or deleted."""
@@ -59,12 +56,14 @@ class State:
     shows: Shows = Shows.NOTHING
     wanted: object = None
     """What the current frame's picture is made from."""
-    traced: object = None
-    """What the map in memory was made from."""
+    disk_of: object = None
+    """What the disk's passes in memory were made for."""
     frame: FrameSetup | None = None
     changed_at: float = 0.0
     steps: Generator[float, None, Any] | None = None
-    """The full map in the making."""
+    """A map in the making."""
+    is_full: bool = False
+    """Whether that is the full one."""
     stamps: dict[Path, object] | None = None
     """The files, as Blender has read them."""
     told: Shows = Shows.NOTHING
@@ -156,7 +155,7 @@ def _wake() -> None:
 
 # --- following ------------------------------------------------------------------------------------
 
-_IN_MEMORY = (Shows.DRAFT, Shows.FULL, Shows.PLAIN)
+_IN_MEMORY = (Shows.SMALL, Shows.FULL, Shows.PLAIN)
 
 
 def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) -> None:
@@ -184,24 +183,33 @@ def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: F
     """Show the files where they are up to date, else a small map."""
     same = frame.parameters == now.wanted
     moved_on = now.frame is None or now.frame.frame != frame.frame
-    may_be_baked = moved_on or same or now.shows is not Shows.DRAFT
+    may_be_baked = moved_on or same or now.shows is not Shows.SMALL
     now.wanted, now.frame = frame.parameters, frame
     if may_be_baked and _show_files(scene, now, maps):
         return
-    draft = draft_of(frame.parameters)
     if same and now.shows in _IN_MEMORY and maps.show_again(scene):
         return  # a change of settings had given the nodes their files
     if now.shows is Shows.FAILED:
-        maps.show_files(scene)  # those of the disk, until things rest
-    if draft != now.traced or now.shows is not Shows.DRAFT:
-        maps.show(scene, physics.bake(draft))
-    now.shows, now.traced, now.steps = Shows.DRAFT, draft, None
-    now.changed_at = time.perf_counter()
+        maps.show_files(scene)  # those of the disk
+    if frame.parameters.disk is None or _has_disk(scene, maps, frame):
+        maps.show(scene, physics.bake(small_maps.small(frame.parameters)))
+    else:
+        maps.show(scene, physics.bake(small_maps.small_with_disk(frame.parameters)))
+        now.disk_of = frame.parameters
+    now.shows, now.steps, now.changed_at = Shows.SMALL, None, time.perf_counter()
     _wake()
 
 
+def _has_disk(scene: bpy.types.Scene, maps: ViewportMaps, frame: FrameSetup) -> bool:
+    """Whether there is a disk to be seen meanwhile, if only an older one."""
+    if maps.has_disk(scene):
+        return True
+    requests = small_maps.requests_of(scene, frame)
+    return bool(requests) and all(path.is_file() for each in requests for path in each.passes)
+
+
 def _show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgraph: bpy.types.Depsgraph) -> None:
-    wanted = plain_map.read(scene, depsgraph, DRAFT_PIXELS)
+    wanted = plain_map.read(scene, depsgraph)
     if wanted != now.wanted or not maps.is_shown(scene):
         maps.show(scene, plain_map.make(wanted))
     now.shows, now.wanted, now.frame, now.steps = Shows.PLAIN, wanted, None, None
@@ -210,7 +218,7 @@ def _show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgrap
 def _show_files(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:
     """Show the current frame's files; return False where they are missing or out of date."""
     assert now.frame is not None
-    requests = _requests(scene, now.frame)
+    requests = small_maps.requests_of(scene, now.frame)
     if not requests or not all(check.is_valid(each, thorough=False) for each in requests):
         return False
     stamps = {path: stamp for each in requests for path, stamp in check.stamps(each).items()}
@@ -222,50 +230,6 @@ def _show_files(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:
         maps.show_files(scene)
     now.shows, now.steps = Shows.FILES, None
     return True
-
-
-def _requests(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
-    """Return the maps of a frame; of a camera whose velocity is measured, with that of the file."""
-    try:
-        requests = frames.requests_of(scene, frame)
-        if frame_setup.active_hole(scene).umbra.motion != CAMERA_ANIMATION:
-            return requests
-        return [replace(each, parameters=_with_velocity_of_file(each)) for each in requests]
-    except physics.BlackHoleError:
-        return []
-
-
-def _with_velocity_of_file(wanted: MapRequest) -> "physics.WarpMapParameters":
-    made = wanted.kind.format.read_metadata(wanted.path)["parameters"]
-    return replace(wanted.parameters, velocity=physics.WarpMapParameters.from_metadata(made).velocity)
-
-
-# --- what is traced -------------------------------------------------------------------------------
-
-
-def draft_of(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
-    """Return what the small map of a frame is made from."""
-    return _of_size(parameters, "DRAFT", DRAFT_PIXELS, disk=None)
-
-
-def full_of(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
-    """Return what the full map of a frame is made from, where its files are not up to date."""
-    return _of_size(parameters, "STANDARD", FULL_PIXELS, disk=parameters.disk)
-
-
-def _of_size(
-    parameters: "physics.WarpMapParameters", accuracy: str, pixels: int, disk: "physics.Disk | None"
-) -> "physics.WarpMapParameters":
-    tolerance, interpolation = ACCURACIES[accuracy]
-    return replace(
-        parameters,
-        camera=plain_map.shrunk(parameters.camera, pixels),
-        supersampling=1,
-        tolerance=tolerance,
-        interpolation=interpolation,
-        method=physics.DEFAULT_METHOD,
-        disk=disk,
-    )
 
 
 # --- when things rest -----------------------------------------------------------------------------
@@ -293,7 +257,7 @@ def advance(budget: float) -> float | None:
             layer = shown_in[0][0].view_layer
             layer.update()
             _follow(scene, now, layer.depsgraph)
-        if now.shows is Shows.DRAFT:
+        if now.shows is Shows.SMALL:
             waits.append(_settle(scene, now, maps, end))
         if now.told is not now.shows:
             now.told = now.shows
@@ -303,26 +267,44 @@ def advance(budget: float) -> float | None:
 
 
 def _settle(scene: bpy.types.Scene, now: State, maps: ViewportMaps, end: float) -> float:
-    """Put the full map in the small one's place; return in how many seconds there is more to do."""
-    left = now.changed_at + REST - time.perf_counter()
-    if left > 0.0:
-        return left
-    assert now.frame is not None
+    """Let the disk follow, then put the full map in the small one's place; return when there is more to do."""
     if now.steps is None:
-        if _show_files(scene, now, maps):
-            return math.inf
-        now.steps = physics.bake_steps(full_of(now.frame.parameters))
+        left = _next_step(scene, now, maps)
+        if now.steps is None:
+            return left
     try:
         while time.perf_counter() < end:
             next(now.steps)
     except StopIteration as done:
         maps.show(scene, done.value)
-        now.shows, now.traced, now.steps = Shows.FULL, None, None
-        return math.inf
-    except physics.BlackHoleError:  # a disk that is impossible: the panel says it
-        now.steps, now.changed_at = None, math.inf
+        now.steps, now.disk_of = None, now.wanted
+        if not now.is_full:
+            return PAUSE
+        now.shows = Shows.FULL
         return math.inf
     return PAUSE
+
+
+def _next_step(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> float:
+    """Begin with what is due; if nothing is, return in how many seconds something will be."""
+    assert now.frame is not None
+    parameters, age = now.frame.parameters, time.perf_counter() - now.changed_at
+    lags = parameters.disk is not None and now.disk_of != now.wanted
+    if age >= REST:
+        if _show_files(scene, now, maps):
+            return math.inf
+        now.steps, now.is_full = physics.bake_steps(small_maps.full(parameters)), True
+    elif lags and age >= PAUSE_OF_DISK:
+        now.steps, now.is_full = physics.bake_steps(small_maps.small_with_disk(parameters)), False
+    return (PAUSE_OF_DISK if lags else REST) - age
+
+
+def disk_lags(scene: bpy.types.Scene) -> bool:
+    """Return whether the disk in the viewport is of an earlier state than the rest."""
+    now = _states.find(scene)
+    if now is None or now.shows is not Shows.SMALL or now.frame is None:
+        return False
+    return now.frame.parameters.disk is not None and now.disk_of != now.wanted
 
 
 # --- registration ---------------------------------------------------------------------------------

@@ -106,7 +106,7 @@ def _map_lines(scene: bpy.types.Scene, now: FrameSetup, wanted: MapRequest) -> l
 
 _IN_VIEWPORT = {
     Shows.FILES: "The viewport follows: this frame's map, as it is baked.",
-    Shows.DRAFT: "The viewport follows with a small map; the full one comes when things rest.",
+    Shows.SMALL: "The viewport follows with a small map; the full one comes when things rest.",
     Shows.FULL: "The viewport follows: this frame's map, traced in memory and not baked.",
     Shows.PLAIN: "The viewport follows: it shows the sky unbent.",
 }
@@ -118,10 +118,10 @@ def _viewport_lines(scene: bpy.types.Scene, frame: FrameSetup | None) -> list[Li
     if state is None or state.shows not in _IN_VIEWPORT or not views.spaces_of(scene):
         return []
     found = [*wrapped(_IN_VIEWPORT[state.shows], "VIEW_CAMERA")]
-    if frame is None or state.shows not in (Shows.DRAFT, Shows.FULL):
+    if frame is None or state.shows not in (Shows.SMALL, Shows.FULL):
         return found
-    if state.shows is Shows.DRAFT and frame.parameters.disk is not None:
-        found += wrapped("The viewport's disk is of an earlier state; it follows when things rest.", "INFO")
+    if viewport.disk_lags(scene):
+        found += wrapped("The viewport's disk is of an earlier state; it follows when the change pauses.", "INFO")
     if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
         found += wrapped("The viewport shows the camera as carried by space; a baked frame shows its motion.", "INFO")
     return found

@@ -28,6 +28,7 @@ def viewport(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.Monk
     live_preview.forget()
     monkeypatch.setattr(live_preview, "can_run", lambda: not live_preview._suspended.now)
     monkeypatch.setattr(module, "REST", 0.0)
+    monkeypatch.setattr(module, "PAUSE_OF_DISK", 0.0)
     yield module
     module.forget()
     live_preview.forget()
@@ -150,22 +151,28 @@ def test_what_is_traced_once_is_not_traced_again(scene, hole, viewport, monkeypa
     assert node(scene).image.source == "GENERATED"
 
 
-def test_at_rest_the_disk_is_that_of_the_place(scene, hole, viewport, exr) -> None:
+def test_the_disk_follows_when_the_change_pauses(scene, hole, viewport, exr, monkeypatch) -> None:
     hole.umbra.disk.enabled = True
     hole.umbra.disk.crossings = 1
+    update()
+    assert not viewport.disk_lags(scene), "the first disk would be magenta"
     settle(viewport)
     before = pixels(node(scene, "disk_pass_1").image)
     scene.camera.location = (0.0, -5.0, 2.0)
     update()
     assert np.array_equal(pixels(node(scene, "disk_pass_1").image), before)
-    assert viewport.state(scene).shows is viewport.Shows.DRAFT
-    settle(viewport)
+    assert viewport.disk_lags(scene)
     made = by_hand(scene, exr, (64, 36), disk=exr.Disk(crossings=1))
-    after = pixels(node(scene, "disk_pass_1").image)
-    covered = (made.disk_passes[0].coverage == 1.0) & (after[..., 3] == 1.0)
-    assert covered.sum() > 100
-    np.testing.assert_allclose(after[covered][:, 0], made.disk_passes[0].radius[covered], rtol=2e-3)
-    assert agrees(pixels(node(scene).image), made)
+    for rest, tolerance in ((math.inf, 0.05), (0.0, 2e-3)):
+        monkeypatch.setattr(viewport, "REST", rest)
+        viewport.advance(10.0)
+        assert not viewport.disk_lags(scene)
+        after = pixels(node(scene, "disk_pass_1").image)
+        covered = (made.disk_passes[0].coverage == 1.0) & (after[..., 3] == 1.0)
+        assert covered.sum() > 100
+        np.testing.assert_allclose(after[covered][:, 0], made.disk_passes[0].radius[covered], rtol=tolerance)
+        assert agrees(pixels(node(scene).image), made)
+    assert viewport.state(scene).shows is viewport.Shows.FULL
 
 
 def test_a_baked_frame_is_read_from_its_file(scene, hole, viewport) -> None:

@@ -34,6 +34,11 @@ class CompositorViewportMaps:
                 one = made.disk_passes[crossing - 1]
                 show_live(node, pixels_of(one.radius, one.phi, one.g, one.coverage))
 
+    def has_disk(self, scene: bpy.types.Scene) -> bool:
+        """Return whether all passes that the disk's group reads are in memory."""
+        setup = _setup(scene)
+        return setup is not None and all(is_live(node) for node, _crossing in disk_sync.passes_of(setup.tree))
+
     def show_again(self, scene: bpy.types.Scene) -> bool:
         """Let the nodes read the maps in memory that they had; return whether the group has one."""
         for node in compositor_sync.map_nodes(scene):
