@@ -36,6 +36,11 @@ def spaces_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.Window, bpy.types.
     return found
 
 
+def is_through_another_camera(space: bpy.types.SpaceView3D, scene: bpy.types.Scene) -> bool:
+    """Return whether a viewport looks through a camera of its own, for which there is no map."""
+    return bool(space.use_local_camera) and space.camera != scene.camera
+
+
 def show(area: bpy.types.Area) -> None:
     """Let a viewport look through the scene's camera, rendered, and with the compositor."""
     space: Any = area.spaces.active

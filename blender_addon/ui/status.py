@@ -115,9 +115,13 @@ _IN_VIEWPORT = {
 def _viewport_lines(scene: bpy.types.Scene, frame: FrameSetup | None) -> list[Line]:
     """What the viewport's compositor shows, where it is on."""
     state = viewport.state(scene)
-    if state is None or state.shows not in _IN_VIEWPORT or not views.spaces_of(scene):
+    shown_in = views.spaces_of(scene)
+    if state is None or state.shows not in _IN_VIEWPORT or not shown_in:
         return []
     found = [*wrapped(_IN_VIEWPORT[state.shows], "VIEW_CAMERA")]
+    if any(views.is_through_another_camera(space, scene) for _window, space in shown_in):
+        text = "A viewport has a local camera other than the scene's, for which the hole is not where it should be."
+        found += wrapped(text, "ERROR")
     if frame is None or state.shows not in (Shows.SMALL, Shows.FULL):
         return found
     if viewport.disk_lags(scene):

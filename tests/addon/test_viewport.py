@@ -83,6 +83,11 @@ def pixels(image: bpy.types.Image) -> np.ndarray:
     return flat.reshape(height, width, 4)[::-1]
 
 
+def panel(addon_module: Callable[[str], ModuleType]) -> str:
+    """What the panel says."""
+    return " ".join(line.text for line in addon_module("ui.status").lines(bpy.context))
+
+
 def by_hand(scene: bpy.types.Scene, exr: ModuleType, size: tuple[int, int], *, spin: float = 0.9, disk: object = None):
     """Every pixel of the scene's map traced, of a camera that is only tilted about x, for a hole at the origin."""
     tilt = scene.camera.rotation_euler.x
@@ -151,7 +156,7 @@ def test_what_is_traced_once_is_not_traced_again(scene, hole, viewport, monkeypa
     assert node(scene).image.source == "GENERATED"
 
 
-def test_the_disk_follows_when_the_change_pauses(scene, hole, viewport, exr, monkeypatch) -> None:
+def test_the_disk_follows_when_the_change_pauses(scene, hole, viewport, exr, monkeypatch, addon_module) -> None:
     hole.umbra.disk.enabled = True
     hole.umbra.disk.crossings = 1
     update()
@@ -162,6 +167,7 @@ def test_the_disk_follows_when_the_change_pauses(scene, hole, viewport, exr, mon
     update()
     assert np.array_equal(pixels(node(scene, "disk_pass_1").image), before)
     assert viewport.disk_lags(scene)
+    assert "The viewport's disk is of an earlier state" in panel(addon_module)
     made = by_hand(scene, exr, (64, 36), disk=exr.Disk(crossings=1))
     for rest, tolerance in ((math.inf, 0.05), (0.0, 2e-3)):
         monkeypatch.setattr(viewport, "REST", rest)
@@ -173,6 +179,11 @@ def test_the_disk_follows_when_the_change_pauses(scene, hole, viewport, exr, mon
         np.testing.assert_allclose(after[covered][:, 0], made.disk_passes[0].radius[covered], rtol=tolerance)
         assert agrees(pixels(node(scene).image), made)
     assert viewport.state(scene).shows is viewport.Shows.FULL
+    assert "disk is of" not in panel(addon_module)
+    assert "traced in memory and not baked" in panel(addon_module)
+    area().spaces.active.use_local_camera = True
+    area().spaces.active.camera = bpy.data.objects["Light"]
+    assert "local camera" in panel(addon_module)
 
 
 def test_a_baked_frame_is_read_from_its_file(scene, hole, viewport) -> None:
@@ -186,6 +197,12 @@ def test_a_baked_frame_is_read_from_its_file(scene, hole, viewport) -> None:
     update()
     settle(viewport)
     assert node(scene).image.source == "SEQUENCE"
+    scene.camera.keyframe_insert("location", frame=1)
+    scene.camera.location.x = 1.0
+    scene.camera.keyframe_insert("location", frame=2)
+    for frame, source in ((2, "GENERATED"), (1, "SEQUENCE")):
+        scene.frame_set(frame)  # without rest: as it is played
+        assert node(scene).image.source == source
 
 
 def test_a_render_reads_the_file(scene, hole, viewport, exr, tmp_path) -> None:
