@@ -16,22 +16,23 @@ from ..settings.scene_properties import ACCURACIES
 
 Camera = physics.PerspectiveCamera | physics.PanoramaCamera
 
-# Pixels of the map that follows, and at the most of the one that takes its place.
-SMALL_PIXELS, FULL_PIXELS = 480 * 270, 1920 * 1080
+# Pixels of the map that follows, and at the most of the one that takes its place; and those of the smallest that
+# follows on a slow machine: with fewer, stars are squares.
+SMALL_PIXELS, FULL_PIXELS, LEAST_PIXELS = 480 * 270, 1920 * 1080, 320 * 180
 
 # Error of interpolation of a small disk, radians: a few of its pixels. Less would take half as long again.
 DISK_INTERPOLATION = 1e-2
 
 
-def shrunk(camera: Camera, pixels: int) -> Camera:
+def shrunk(camera: Camera, pixels: float) -> Camera:
     """Return the camera that sees the same in at most so many pixels, about, of the same aspect."""
     scale = min(math.sqrt(pixels / (camera.width * camera.height)), 1.0)
     return camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
 
 
-def small(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
+def small(parameters: physics.WarpMapParameters, pixels: float = SMALL_PIXELS) -> physics.WarpMapParameters:
     """Return what the small map of a frame is made from, without a disk."""
-    return _of_size(parameters, SMALL_PIXELS, ACCURACIES["DRAFT"], None)
+    return _of_size(parameters, pixels, ACCURACIES["DRAFT"], None)
 
 
 def small_with_disk(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
@@ -46,7 +47,7 @@ def full(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
 
 
 def _of_size(
-    parameters: physics.WarpMapParameters, pixels: int, accuracy: tuple[float, float], disk: physics.Disk | None
+    parameters: physics.WarpMapParameters, pixels: float, accuracy: tuple[float, float], disk: physics.Disk | None
 ) -> physics.WarpMapParameters:
     tolerance, interpolation = accuracy
     return replace(

@@ -31,6 +31,8 @@ from . import live_preview, plain_map, small_maps, views
 
 # Seconds without a change after which the disk follows, and after which things rest.
 PAUSE_OF_DISK, REST = 0.1, 0.3
+# Seconds that a map may add to a draw: where it takes longer, the next one has fewer pixels; else by so much more.
+LONGEST, GROWTH = 0.06, 1.2
 # Seconds that one slice of work may take, and between two of them.
 BUDGET, PAUSE = 0.08, 0.001
 
@@ -68,8 +70,10 @@ class State:
     """The files, as Blender has read them."""
     told: Shows = Shows.NOTHING
     """What the panel says."""
+    pixels: float = small_maps.SMALL_PIXELS
+    """Of the next small map."""
     cost: float = 0.0
-    """Seconds of the main thread for the last change that was followed."""
+    """Seconds of the main thread for the last small map, from the change to the image."""
 
 
 _states = SESSION.per_scene(State, Life.FILE)
@@ -113,7 +117,7 @@ def notice(scene: bpy.types.Scene) -> None:
 def start_again() -> None:
     """Look at all scenes again: after undo or a render, or when a file was opened."""
     for scene, now in _states.items():
-        _states.put(scene, State(stamps=now.stamps, told=now.told))
+        _states.put(scene, State(stamps=now.stamps, told=now.told, pixels=now.pixels))
         _wake()
 
 
@@ -172,32 +176,36 @@ def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) 
         frame = frames.read(scene, depsgraph, False)
         if frame.parameters == now.wanted and (now.shows in _IN_MEMORY) == maps.is_shown(scene):
             return
-        _show_frame(scene, now, maps, frame)
-        now.cost = time.thread_time() - began
+        if _show_frame(scene, now, maps, frame):
+            now.cost = time.thread_time() - began
+            pixels = now.pixels * min(LONGEST / now.cost, GROWTH)
+            now.pixels = min(max(pixels, small_maps.LEAST_PIXELS), small_maps.SMALL_PIXELS)
     except physics.BlackHoleError:  # the panel says it
         maps.show_nothing(scene)
         now.shows, now.wanted, now.frame, now.steps = Shows.FAILED, None, None, None
 
 
-def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: FrameSetup) -> None:
-    """Show the files where they are up to date, else a small map."""
+def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: FrameSetup) -> bool:
+    """Show the files where they are up to date, else a small map; return whether one was traced."""
     same = frame.parameters == now.wanted
     moved_on = now.frame is None or now.frame.frame != frame.frame
     may_be_baked = moved_on or same or now.shows is not Shows.SMALL
     now.wanted, now.frame = frame.parameters, frame
     if may_be_baked and _show_files(scene, now, maps):
-        return
+        return False
     if same and now.shows in _IN_MEMORY and maps.show_again(scene):
-        return  # a change of settings had given the nodes their files
+        return False  # a change of settings had given the nodes their files
     if now.shows is Shows.FAILED:
         maps.show_files(scene)  # those of the disk
-    if frame.parameters.disk is None or _has_disk(scene, maps, frame):
-        maps.show(scene, physics.bake(small_maps.small(frame.parameters)))
+    alone = frame.parameters.disk is None or _has_disk(scene, maps, frame)
+    if alone:
+        maps.show(scene, physics.bake(small_maps.small(frame.parameters, now.pixels)))
     else:
         maps.show(scene, physics.bake(small_maps.small_with_disk(frame.parameters)))
         now.disk_of = frame.parameters
     now.shows, now.steps, now.changed_at = Shows.SMALL, None, time.perf_counter()
     _wake()
+    return alone
 
 
 def _has_disk(scene: bpy.types.Scene, maps: ViewportMaps, frame: FrameSetup) -> bool:

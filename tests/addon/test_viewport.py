@@ -27,6 +27,7 @@ def viewport(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.Monk
     module.forget()
     live_preview.forget()
     monkeypatch.setattr(live_preview, "can_run", lambda: not live_preview._suspended.now)
+    monkeypatch.setattr(module, "LONGEST", math.inf)  # the machine may be busy
     monkeypatch.setattr(module, "REST", 0.0)
     monkeypatch.setattr(module, "PAUSE_OF_DISK", 0.0)
     yield module
@@ -144,6 +145,17 @@ def test_the_map_that_follows_is_small_and_the_one_at_rest_full(scene, hole, vie
     assert tuple(node(scene).image.size) == (255, 509)
     settle(viewport)
     assert tuple(node(scene).image.size) == (500, 1000)
+
+
+def test_on_a_slow_machine_the_map_has_fewer_pixels(scene, hole, viewport, monkeypatch) -> None:
+    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080
+    sizes = []
+    for longest in (1e-9, 1e-9, math.inf, math.inf):
+        monkeypatch.setattr(viewport, "LONGEST", longest)
+        scene.camera.location.x += 0.1
+        update()
+        sizes.append(tuple(node(scene).image.size))
+    assert sizes == [(480, 270), (320, 180), (320, 180), (351, 197)]
 
 
 def test_what_is_traced_once_is_not_traced_again(scene, hole, viewport, monkeypatch) -> None:
