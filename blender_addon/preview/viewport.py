@@ -33,8 +33,8 @@ from . import live_preview, plain_map, small_maps, views
 PAUSE_OF_DISK, REST = 0.1, 0.3
 # Seconds that a map may add to a draw: where it takes longer, the next one has fewer pixels; else by so much more.
 LONGEST, GROWTH = 0.06, 1.2
-# Seconds that one slice of work may take, and between two of them.
-BUDGET, PAUSE = 0.08, 0.001
+# Seconds that one slice of work may take, or as long as a draw takes but not more than the second; and between two.
+BUDGET, LARGEST_BUDGET, PAUSE = 0.08, 0.5, 0.001
 
 
 class Shows(enum.Enum):
@@ -94,7 +94,7 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         return
     shown_in = views.spaces_of(scene)
     if not shown_in:
-        _wake()  # the timer clears up
+        wake()  # the timer clears up
     elif any(window.view_layer.name == depsgraph.view_layer.name for window, _space in shown_in):
         _follow(scene, now, depsgraph)
 
@@ -111,14 +111,14 @@ def notice(scene: bpy.types.Scene) -> None:
     maps = registry.of(scene).viewport
     if _states.find(scene) is None and live_preview.can_run() and maps is not None and maps.can_show(scene):
         _states.of(scene)
-        _wake()
+        wake()
 
 
 def start_again() -> None:
     """Look at all scenes again: after undo or a render, or when a file was opened."""
     for scene, now in _states.items():
         _states.put(scene, State(stamps=now.stamps, told=now.told, pixels=now.pixels))
-        _wake()
+        wake()
 
 
 def show_files() -> None:
@@ -152,7 +152,8 @@ def forget() -> None:
         bpy.app.timers.unregister(_tick)
 
 
-def _wake() -> None:
+def wake() -> None:
+    """Let the timer look after all scenes soon."""
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0.0)
 
@@ -204,7 +205,7 @@ def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: F
         maps.show(scene, physics.bake(small_maps.small_with_disk(frame.parameters)))
         now.disk_of = frame.parameters
     now.shows, now.steps, now.changed_at = Shows.SMALL, None, time.perf_counter()
-    _wake()
+    wake()
     return alone
 
 
@@ -243,8 +244,16 @@ def _show_files(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:
 # --- when things rest -----------------------------------------------------------------------------
 
 
+# When the timer's last slice of work ended, if more was to do.
+_ended = SESSION.value(lambda: math.inf, Life.FILE)
+
+
 def _tick() -> float | None:
-    return advance(BUDGET)
+    """The timer: one slice of work, no shorter than the draw before it, or slow draws would make it last."""
+    draw = time.perf_counter() - _ended.now
+    wait = advance(min(max(BUDGET, draw), LARGEST_BUDGET))
+    _ended.now = time.perf_counter() if wait == PAUSE else math.inf
+    return wait
 
 
 def advance(budget: float) -> float | None:

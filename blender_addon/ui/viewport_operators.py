@@ -29,6 +29,7 @@ class UMBRA_OT_show_in_viewport(bpy.types.Operator):
         if is_shown(context):
             for area in areas:
                 views.give_back(area)
+            viewport.wake()  # nobody may look any more
             return {"FINISHED"}
         maps = registry.of(scene).viewport
         if maps is None or not maps.can_show(scene):

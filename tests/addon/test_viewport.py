@@ -225,6 +225,7 @@ def test_a_render_reads_the_file(scene, hole, viewport, exr, tmp_path) -> None:
     beside = render(scene, tmp_path / "beside.exr", exr)
     settle(viewport)
     assert press() == {"FINISHED"}
+    assert bpy.app.timers.is_registered(viewport._tick)
     viewport.advance(0.0)
     assert not [each.name for each in bpy.data.images if each.name.startswith("Umbra Live")]
     assert np.array_equal(beside, render(scene, tmp_path / "alone.exr", exr))
