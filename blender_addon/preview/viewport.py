@@ -77,6 +77,8 @@ class State:
 
 
 _states = SESSION.per_scene(State, Life.FILE)
+# True while a file is saved: Blender draws the scene for the file's thumbnail, and updates it for that.
+_is_saving = SESSION.value(bool, Life.FILE)
 
 
 def state(scene: bpy.types.Scene) -> State | None:
@@ -90,7 +92,7 @@ def state(scene: bpy.types.Scene) -> State | None:
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Something in the scene has changed, or its frame: show it in the same draw."""
     now = _states.find(scene)
-    if now is None or not live_preview.can_run() or stepping.is_stepping.now:
+    if now is None or _is_saving.now or not live_preview.can_run() or stepping.is_stepping.now:
         return
     shown_in = views.spaces_of(scene)
     if not shown_in:
@@ -122,15 +124,22 @@ def start_again() -> None:
 
 
 def show_files() -> None:
-    """Let all scenes read the files of their frames, as a file that is saved or a render should have it."""
+    """Let all scenes read the files of their frames, as a render should have it."""
     for scene in bpy.data.scenes:
         maps = registry.of(scene).viewport
         if scene.library is None and maps is not None and maps.is_shown(scene):
             maps.show_files(scene)
 
 
-def show_again() -> None:
-    """The file is saved: show what was shown before."""
+def before_saving() -> None:
+    """Let all scenes read their files, until the file is saved."""
+    _is_saving.now = True
+    show_files()
+
+
+def after_saving() -> None:
+    """The file is saved, or could not be: show what was shown before."""
+    _is_saving.now = False
     for scene, now in _states.items():
         maps = registry.of(scene).viewport
         if maps is not None and now.shows in _IN_MEMORY and live_preview.can_run():
@@ -148,6 +157,7 @@ def drop() -> None:
 def forget() -> None:
     """Drop everything: another file was opened, or the add-on is disabled."""
     _states.clear()
+    _is_saving.clear()
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
 

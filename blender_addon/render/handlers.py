@@ -400,7 +400,7 @@ def on_import_post(_imported: object = None, _unused: object = None) -> None:
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     live_preview.drop_live()
-    viewport.show_files()
+    viewport.before_saving()
     saving.before(Path(path or bpy.data.filepath))
 
 
@@ -409,7 +409,14 @@ def on_save_post(path: str = "", _unused: object = None) -> None:
     """The file is saved: the preview shows itself again."""
     saving.after(Path(path or bpy.data.filepath))
     live_preview.start_again()
-    viewport.show_again()
+    viewport.after_saving()
+
+
+@persistent
+def on_save_post_fail(_path: str = "", _unused: object = None) -> None:
+    """The file could not be saved."""
+    live_preview.start_again()
+    viewport.after_saving()
 
 
 @persistent
@@ -434,6 +441,7 @@ _HANDLERS = {
     "blend_import_post": on_import_post,
     "save_pre": on_save_pre,
     "save_post": on_save_post,
+    "save_post_fail": on_save_post_fail,
     "undo_post": on_undo_post,
     "redo_post": on_undo_post,
 }

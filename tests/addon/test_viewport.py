@@ -236,11 +236,31 @@ def test_a_saved_file_has_no_live_map_and_goes_on(scene, hole, viewport, tmp_pat
     settle(viewport)
     hole.umbra.disk.enabled = True
     settle(viewport)
+    bpy.ops.ed.undo_push(message="before")
+    scene.camera.location.x = 1.0
+    update()
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    settle(viewport)
     shown = pixels(node(scene).image)
     path = str(tmp_path / "file.blend")
+    drawn = []
+
+    def thumbnail(*_given: object) -> None:  # in a window Blender draws the scene for it, after all handlers
+        scene.camera.update_tag()
+        update()
+        drawn.append(node(scene).image.source)
+
+    bpy.app.handlers.save_pre.append(thumbnail)
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     assert node(scene).image.source == node(scene, "disk_pass_1").image.source == "GENERATED"
     assert np.array_equal(pixels(node(scene).image), shown), "saving has dropped the map"
+    with pytest.raises(RuntimeError):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "no" / "file.blend"), copy=True)
+    assert node(scene).image.source == "GENERATED"
+    assert set(drawn) == {"SEQUENCE"}
+    bpy.app.handlers.save_pre.remove(thumbnail)
     with bpy.data.libraries.load(path) as (found, _wanted):
         assert not [name for name in found.images if name.startswith("Umbra Live")]
         assert "Umbra Warp Map" in found.images
@@ -248,7 +268,7 @@ def test_a_saved_file_has_no_live_map_and_goes_on(scene, hole, viewport, tmp_pat
 
 def test_a_file_that_blender_saves_by_itself_is_given_its_files(scene, hole, viewport, tmp_path, monkeypatch) -> None:
     path = str(tmp_path / "file.blend")
-    monkeypatch.setattr(viewport, "show_files", lambda: None)
+    monkeypatch.setattr(viewport, "before_saving", lambda: None)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     monkeypatch.undo()  # there is no window either
     bpy.ops.wm.open_mainfile(filepath=path)
