@@ -10,24 +10,18 @@ A viewport is noticed when it is drawn. Nothing here runs without a window or du
 files are given the nodes as they are without it.
 """
 
-import enum
 import math
 import time
-from collections.abc import Generator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import bpy
 
-from ..bake import check
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.protocol import ViewportMaps
-from ..scene import frame_setup, presence, stepping
-from ..scene.frame_setup import FrameSetup
-from . import live_preview, plain_map, small_maps, views
+from ..scene import presence, stepping
+from . import live_preview, small_maps, views
+from .shown import IN_MEMORY, Shows, State, show_files_of_frame, show_frame, show_plain
 
 # Seconds without a change after which the disk follows, and after which things rest.
 PAUSE_OF_DISK, REST = 0.1, 0.3
@@ -35,45 +29,6 @@ PAUSE_OF_DISK, REST = 0.1, 0.3
 LONGEST, GROWTH = 0.06, 1.2
 # Seconds that one slice of work may take, or as long as a draw takes but not more than the second; and between two.
 BUDGET, LARGEST_BUDGET, PAUSE = 0.08, 0.5, 0.001
-
-
-class Shows(enum.Enum):
-    """What a scene's picture in the viewport is made from."""
-
-    NOTHING = enum.auto()
-    """Not known yet: what it was made from before."""
-    FAILED = enum.auto()
-    """No map: it is magenta."""
-    FILES = enum.auto()
-    SMALL = enum.auto()
-    FULL = enum.auto()
-    PLAIN = enum.auto()
-    """A map that bends nothing: the hole is hidden or deleted."""
-
-
-@dataclass
-class State:
-    """What the viewport shows of one scene."""
-
-    shows: Shows = Shows.NOTHING
-    wanted: object = None
-    """What the current frame's picture is made from."""
-    disk_of: object = None
-    """What the disk's passes in memory were made for."""
-    frame: FrameSetup | None = None
-    changed_at: float = 0.0
-    steps: Generator[float, None, Any] | None = None
-    """A map in the making."""
-    is_full: bool = False
-    """Whether that is the full one."""
-    stamps: dict[Path, object] | None = None
-    """The files, as Blender has read them."""
-    told: Shows = Shows.NOTHING
-    """What the panel says."""
-    pixels: float = small_maps.SMALL_PIXELS
-    """Of the next small map."""
-    cost: float = 0.0
-    """Seconds of the main thread for the last small map, from the change to the image."""
 
 
 _states = SESSION.per_scene(State, Life.FILE)
@@ -142,7 +97,7 @@ def after_saving() -> None:
     _is_saving.now = False
     for scene, now in _states.items():
         maps = registry.of(scene).viewport
-        if maps is not None and now.shows in _IN_MEMORY and live_preview.can_run():
+        if maps is not None and now.shows in IN_MEMORY and live_preview.can_run():
             maps.show_again(scene)
 
 
@@ -170,8 +125,6 @@ def wake() -> None:
 
 # --- following ------------------------------------------------------------------------------------
 
-_IN_MEMORY = (Shows.SMALL, Shows.FULL, Shows.PLAIN)
-
 
 def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) -> None:
     """Show the frame at which the dependency graph stands."""
@@ -182,73 +135,20 @@ def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) 
     began = time.thread_time()
     try:
         if presence.is_absent(scene):
-            _show_plain(scene, now, maps, depsgraph)
+            show_plain(scene, now, maps, depsgraph)
             return
         frame = frames.read(scene, depsgraph, False)
-        if frame.parameters == now.wanted and (now.shows in _IN_MEMORY) == maps.is_shown(scene):
+        if frame.parameters == now.wanted and (now.shows in IN_MEMORY) == maps.is_shown(scene):
             return
-        if _show_frame(scene, now, maps, frame):
+        if show_frame(scene, now, maps, frame):
             now.cost = time.thread_time() - began
             pixels = now.pixels * min(LONGEST / now.cost, GROWTH)
             now.pixels = min(max(pixels, small_maps.LEAST_PIXELS), small_maps.SMALL_PIXELS)
+        if now.shows is Shows.SMALL:
+            wake()
     except physics.BlackHoleError:  # the panel says it
         maps.show_nothing(scene)
         now.shows, now.wanted, now.frame, now.steps = Shows.FAILED, None, None, None
-
-
-def _show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: FrameSetup) -> bool:
-    """Show the files where they are up to date, else a small map; return whether one was traced."""
-    same = frame.parameters == now.wanted
-    moved_on = now.frame is None or now.frame.frame != frame.frame
-    may_be_baked = moved_on or same or now.shows is not Shows.SMALL
-    now.wanted, now.frame = frame.parameters, frame
-    if may_be_baked and _show_files(scene, now, maps):
-        return False
-    if same and now.shows in _IN_MEMORY and maps.show_again(scene):
-        return False  # a change of settings had given the nodes their files
-    if now.shows is Shows.FAILED:
-        maps.show_files(scene)  # those of the disk
-    alone = frame.parameters.disk is None or _has_disk(scene, maps, frame)
-    if alone:
-        maps.show(scene, physics.bake(small_maps.small(frame.parameters, now.pixels)))
-    else:
-        maps.show(scene, physics.bake(small_maps.small_with_disk(frame.parameters)))
-        now.disk_of = frame.parameters
-    now.shows, now.steps, now.changed_at = Shows.SMALL, None, time.perf_counter()
-    wake()
-    return alone
-
-
-def _has_disk(scene: bpy.types.Scene, maps: ViewportMaps, frame: FrameSetup) -> bool:
-    """Whether there is a disk to be seen meanwhile, if only an older one."""
-    if maps.has_disk(scene):
-        return True
-    requests = small_maps.requests_of(scene, frame)
-    return bool(requests) and all(path.is_file() for each in requests for path in each.passes)
-
-
-def _show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgraph: bpy.types.Depsgraph) -> None:
-    wanted = plain_map.read(scene, depsgraph)
-    if wanted != now.wanted or not maps.is_shown(scene):
-        maps.show(scene, plain_map.make(wanted))
-    now.shows, now.wanted, now.frame, now.steps = Shows.PLAIN, wanted, None, None
-
-
-def _show_files(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:
-    """Show the current frame's files; return False where they are missing or out of date."""
-    assert now.frame is not None
-    requests = small_maps.requests_of(scene, now.frame)
-    if not requests or not all(check.is_valid(each, thorough=False) for each in requests):
-        return False
-    stamps = {path: stamp for each in requests for path, stamp in check.stamps(each).items()}
-    known = now.stamps
-    if known is None or any(known.get(path, stamp) != stamp for path, stamp in stamps.items()):
-        registry.of(scene).forget_loaded_maps(scene)
-    now.stamps = {**(known or {}), **stamps}
-    if now.shows is not Shows.FILES or maps.is_shown(scene):
-        maps.show_files(scene)
-    now.shows, now.steps = Shows.FILES, None
-    return True
 
 
 # --- when things rest -----------------------------------------------------------------------------
@@ -318,7 +218,7 @@ def _next_step(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> float:
     parameters, age = now.frame.parameters, time.perf_counter() - now.changed_at
     lags = parameters.disk is not None and now.disk_of != now.wanted
     if age >= REST:
-        if _show_files(scene, now, maps):
+        if show_files_of_frame(scene, now, maps):
             return math.inf
         now.steps, now.is_full = physics.bake_steps(small_maps.full(parameters)), True
     elif lags and age >= PAUSE_OF_DISK:

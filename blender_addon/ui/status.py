@@ -15,7 +15,7 @@ from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.shared import drawing
 from ..preview import viewport, views
-from ..preview.viewport import Shows
+from ..preview.shown import Shows
 from ..scene import frame_setup, instanced_hole, presence
 from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
