@@ -11,7 +11,7 @@ from .command import command_line
 from .core import image_library
 from .core.session import SESSION, Life
 from .outputs import registration as outputs
-from .preview import live_preview
+from .preview import live_preview, viewport
 from .render import handlers
 from .settings import disk_properties, hole_properties, scene_properties
 from .ui import (
@@ -25,6 +25,7 @@ from .ui import (
     panels,
     preview_panel,
     render_operators,
+    viewport_operators,
 )
 
 _CLASSES = (
@@ -40,6 +41,7 @@ _CLASSES = (
     *farm_operators.CLASSES,
     *accuracy_check.CLASSES,
     *preview_panel.CLASSES,
+    *viewport_operators.CLASSES,
 )
 
 # Each has a function `register` and one that undoes it.
@@ -49,6 +51,7 @@ _MODULES = (
     scene_properties,
     outputs,
     live_preview,
+    viewport,
     operators,
     render_operators,
     preview_panel,

@@ -60,6 +60,34 @@ class LiveMap(Protocol):
         """Let the scene read its files again."""
 
 
+class ViewportMaps(Protocol):
+    """Maps in memory that an output's picture reads in the viewport, in place of its files, while the scene changes."""
+
+    def can_show(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene has something that can show a map."""
+
+    def is_shown(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene reads a map in memory now."""
+
+    def show(self, scene: bpy.types.Scene, made: "physics.WarpMap") -> None:
+        """Show a map, with the passes of its disk if it has any; those of a disk that it lacks stay as they are."""
+
+    def has_disk(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene reads all passes of its disk from memory, of whatever frame they are."""
+
+    def show_again(self, scene: bpy.types.Scene) -> bool:
+        """Show the map in memory once more, after the scene was given its files; return False if there is none."""
+
+    def show_files(self, scene: bpy.types.Scene) -> None:
+        """Let the scene read its files; the map in memory stays."""
+
+    def show_nothing(self, scene: bpy.types.Scene) -> None:
+        """Let the scene read no map: the picture is magenta."""
+
+    def drop(self, scene: bpy.types.Scene) -> None:
+        """Let the scene read its files, and free the map in memory."""
+
+
 class FrameCarrier(Protocol):
     """What an output carries into each frame by itself, and what a file must hold as keyframes without the add-on."""
 
@@ -222,6 +250,8 @@ class Output(ABC):
     # --- the viewport and the panel ---------------------------------------------------------------
 
     live: LiveMap | None = None
+    viewport: ViewportMaps | None = None
+    """The maps that the 3D viewport's compositor shows, if the picture is made there."""
     follows_preview = False
     """Whether the live preview is switched on together with this output."""
     settings_label = ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The live preview: a small map and a thumbnail that follow the scene.
+"""What follows the scene: the World's small map and the thumbnail (`live_preview`), and the viewport's compositor.
 
 Imports `outputs` and below.
 """

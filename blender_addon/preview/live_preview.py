@@ -245,14 +245,14 @@ def _work(
             now.map_shown = wanted
             now.settle_at = time.perf_counter() + SETTLE if needs_another_look else None
             now.latency = time.perf_counter() - now.since
-            _redraw()
+            redraw()
             yield
     picture = yield from _paused(thumbnail.steps(uid, replace(draft, camera=camera)))
     scene = scene_of(uid)
     if picture is not None and scene is not None:
         thumbnail.show(scene, picture)
         now.latency = now.latency or time.perf_counter() - now.since
-        _redraw()
+        redraw()
     now.updates += 1
 
 
@@ -273,10 +273,11 @@ def _show_problem(scene: bpy.types.Scene) -> None:
     if output.live is not None and output.live.can_show(scene) and output.live.is_shown(scene):
         output.live.drop(scene)
         output.take_away(scene)
-    _redraw()
+    redraw()
 
 
-def _redraw() -> None:
+def redraw() -> None:
+    """Let viewports, panels and images be drawn."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"VIEW_3D", "PROPERTIES", "IMAGE_EDITOR"}:

@@ -26,7 +26,7 @@ from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, refreshing, registry, saving
 from ..outputs.shared import disk_light
-from ..preview import live_preview
+from ..preview import live_preview, viewport
 from ..scene import frame_setup, presence
 from ..scene.placement import placement
 from ..settings import saved_names
@@ -107,7 +107,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     """A render begins, of one frame or many."""
     now = _renders.of(scene)
     now.has_failed = now.is_noted = False
-    _guarded(lambda _scene: live_preview.suspend(), scene)
+    _guarded(lambda _scene: _suspend_previews(), scene)
     _guarded(lambda _scene: saved_names.migrate(), scene)  # a script may have made keyframes by former names
     output = registry.of(scene)
     if not output.is_in_use(scene):
@@ -156,6 +156,7 @@ def on_frame_change_post(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph 
     if depsgraph.mode != "RENDER" and not now.is_running:
         disk_light.follow(scene, frame_setup.find_active_hole(scene))
         registry.of(scene).follow(scene, depsgraph)
+        viewport.on_update(scene, depsgraph)
     if depsgraph.mode != "RENDER" or not (now.is_waiting or now.shown):
         return
     if now.shown and scene.frame_current_final != now.moment:  # Cycles looks at other moments for its motion blur
@@ -177,6 +178,7 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph |
     if not _renders.of(scene).is_running:
         disk_light.remove_orphans(scene)
         registry.of(scene).follow(scene, depsgraph)
+        viewport.on_update(scene, depsgraph)
 
 
 @persistent
@@ -206,6 +208,14 @@ def on_render_end(scene: bpy.types.Scene, _unused: object = None) -> None:
         now.is_running = False
         canceled, now.is_waiting = now.is_waiting, False
         registry.of(scene).end_render(scene, canceled=canceled)
+    if not now.has_failed:  # else the map stays away until something changes
+        viewport.start_again()
+
+
+def _suspend_previews() -> None:
+    """Keep all previews away from the render."""
+    live_preview.suspend()
+    viewport.show_files()
 
 
 def _stand_aside(scene: bpy.types.Scene) -> None:
@@ -369,6 +379,8 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     """A file was opened: bring what older versions of this add-on have made up to date."""
     SESSION.end(Life.FILE)
     live_preview.forget()
+    viewport.forget()
+    viewport.drop()  # a file that Blender has saved by itself has what was shown
     saved_names.migrate()
     for scene in bpy.data.scenes:
         if scene.library is None:
@@ -388,6 +400,7 @@ def on_import_post(_imported: object = None, _unused: object = None) -> None:
 def on_save_pre(path: str = "", _unused: object = None) -> None:
     """A file is about to be saved: it should refer to the maps of the settings that are saved."""
     live_preview.drop_live()
+    viewport.before_saving()
     saving.before(Path(path or bpy.data.filepath))
 
 
@@ -396,12 +409,22 @@ def on_save_post(path: str = "", _unused: object = None) -> None:
     """The file is saved: the preview shows itself again."""
     saving.after(Path(path or bpy.data.filepath))
     live_preview.start_again()
+    viewport.after_saving()
+
+
+@persistent
+def on_save_post_fail(_path: str = "", _unused: object = None) -> None:
+    """The file could not be saved."""
+    live_preview.start_again()
+    viewport.after_saving()
 
 
 @persistent
 def on_undo_post(_scene: bpy.types.Scene, _unused: object = None) -> None:
     """Undo or redo has replaced what the preview had shown."""
     live_preview.start_again()
+    viewport.show_files()
+    viewport.start_again()
 
 
 # --- registration ---------------------------------------------------------------------------------
@@ -418,6 +441,7 @@ _HANDLERS = {
     "blend_import_post": on_import_post,
     "save_pre": on_save_pre,
     "save_post": on_save_post,
+    "save_post_fail": on_save_post_fail,
     "undo_post": on_undo_post,
     "redo_post": on_undo_post,
 }

@@ -6,7 +6,7 @@ import bpy
 from ..outputs import registry
 from ..scene import frame_setup
 from ..settings.hole_properties import CAMERA_ANIMATION
-from . import bake_operators, render_operators, status
+from . import bake_operators, render_operators, status, viewport_operators
 from .sidebar import HolePanel, UmbraPanel
 
 
@@ -72,6 +72,9 @@ class VIEW3D_PT_umbra(UmbraPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("umbra.bake_frame", icon="RENDER_STILL")
         row.operator("umbra.bake_animation", icon="RENDER_ANIMATION")
+        if registry.of(scene).viewport is not None:
+            is_shown = viewport_operators.is_shown(context)
+            layout.operator("umbra.show_in_viewport", icon="VIEW_CAMERA", depress=is_shown)
         if render_operators.may_bake(scene):
             row = layout.row(align=True)
             row.operator("umbra.render_frame", text="Render Image")

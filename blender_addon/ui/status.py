@@ -14,6 +14,8 @@ from ..core.physics_api import physics
 from ..core.session import SESSION, Life
 from ..outputs import frames, registry
 from ..outputs.shared import drawing
+from ..preview import viewport, views
+from ..preview.shown import Shows
 from ..scene import frame_setup, instanced_hole, presence
 from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
@@ -59,7 +61,8 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
             return wrapped(error.for_user(), "ERROR")
         return wrapped("This scene has no black hole.", "INFO")
     if presence.is_absent(scene):
-        return wrapped("The black hole is hidden in renders or deleted: pictures show the plain scene.", "INFO")
+        plain = wrapped("The black hole is hidden in renders or deleted: pictures show the plain scene.", "INFO")
+        return plain + tuple(_viewport_lines(scene, None))
     try:
         # drawing must not step the scene to other frames, so the camera's own velocity is not measured here
         depsgraph = context.evaluated_depsgraph_get()
@@ -75,6 +78,7 @@ def lines(context: bpy.types.Context) -> tuple[Line, ...]:
             found.append(Line("", operator=notice.operator))
     for wanted in frames.requests_of(scene, now):
         found += _map_lines(scene, now, wanted)
+    found += _viewport_lines(scene, now)
     found += _place_lines(now)
     others = len(frame_setup.holes(scene)) - 1
     if others > 0:
@@ -97,6 +101,33 @@ def _map_lines(scene: bpy.types.Scene, now: FrameSetup, wanted: MapRequest) -> l
     found.append(Line(f"{_baked(scene, now, every, wanted)} of {len(every)} frames baked", "SEQUENCE"))
     if wanted.folder.is_temporary:
         found += wrapped("This file is not saved: its maps are in a temporary folder.", "INFO")
+    return found
+
+
+_IN_VIEWPORT = {
+    Shows.FILES: "The viewport follows: this frame's map, as it is baked.",
+    Shows.SMALL: "The viewport follows with a small map; the full one comes when things rest.",
+    Shows.FULL: "The viewport follows: this frame's map, traced in memory and not baked.",
+    Shows.PLAIN: "The viewport follows: it shows the sky unbent.",
+}
+
+
+def _viewport_lines(scene: bpy.types.Scene, frame: FrameSetup | None) -> list[Line]:
+    """What the viewport's compositor shows, where it is on."""
+    state = viewport.state(scene)
+    shown_in = views.spaces_of(scene)
+    if state is None or state.shows not in _IN_VIEWPORT or not shown_in:
+        return []
+    found = [*wrapped(_IN_VIEWPORT[state.shows], "VIEW_CAMERA")]
+    if any(views.is_through_another_camera(space, scene) for _window, space in shown_in):
+        text = "A viewport has a local camera other than the scene's, for which the hole is not where it should be."
+        found += wrapped(text, "ERROR")
+    if frame is None or state.shows not in (Shows.SMALL, Shows.FULL):
+        return found
+    if viewport.disk_lags(scene):
+        found += wrapped("The viewport's disk is of an earlier state; it follows when the change pauses.", "INFO")
+    if frame_setup.active_hole(scene).umbra.motion == CAMERA_ANIMATION:
+        found += wrapped("The viewport shows the camera as carried by space; a baked frame shows its motion.", "INFO")
     return found
 
 

@@ -121,6 +121,22 @@ class PerspectiveCamera:
             sensor_fit="VERTICAL",
         )
 
+    def resized(self, width: int, height: int) -> PerspectiveCamera:
+        """Return the camera that sees exactly the same in another number of pixels.
+
+        Raises
+        ------
+        BlackHoleError
+            For a size out of range.
+        """
+        return replace(
+            self,
+            width=width,
+            height=height,
+            pixel_aspect_x=self.pixel_aspect_x * self.width / width,
+            pixel_aspect_y=self.pixel_aspect_y * self.height / height,
+        )
+
     def cropped(self, column: int, row: int, width: int, height: int) -> PerspectiveCamera:
         """Return the camera whose picture is a part of this one's, `column` pixels from its left, `row` from its top.
 
@@ -225,6 +241,16 @@ class PanoramaCamera:
                     f"it must rise within -{math.degrees(limit):g} and {math.degrees(limit):g} degrees.",
                     code="camera.lens",
                 )
+
+    def resized(self, width: int, height: int) -> PanoramaCamera:
+        """Return the camera that sees exactly the same in another number of pixels.
+
+        Raises
+        ------
+        BlackHoleError
+            For a size out of range.
+        """
+        return replace(self, width=width, height=height)
 
     def cropped(self, column: int, row: int, width: int, height: int) -> PanoramaCamera:
         """Return the camera whose picture is a part of this one's, `column` pixels from its left, `row` from its top.

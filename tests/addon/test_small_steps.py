@@ -108,7 +108,8 @@ def test_what_is_switched_is_said_in_one_line(
     assert "Film > Transparent on" in line
     assert "Compositor Precision Full" in line
     assert "Lock Interface" not in line
-    assert "View" not in line
+    assert "View Transform" not in line
+    assert 'Depth pass of view layer "ViewLayer" on' in line
     assert ("Use Nodes on" in line) == (bpy.app.version < (5, 0))
     bpy.ops.umbra.set_output(output="CYCLES_LENS")
     line = said(capfd)

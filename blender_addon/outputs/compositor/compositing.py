@@ -26,6 +26,7 @@ from ..shared.compositor_tree import (
     has_scene_tree,
     render_layers,
 )
+from ..shared.map_images import drop_live
 from ..shared.tree_editing import (
     OUTPUT_LINK,
     add_render_layer,
@@ -233,6 +234,8 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
         tree.nodes.remove(group)
     black_hole_group.remove_unused()
     maps, skies = find_nodes(tree, MAP), find_nodes(tree, SKY)
+    for node in maps:
+        drop_live(node)
     images = {node.image for node in maps if node.image is not None}
     for node in maps + skies:
         tree.nodes.remove(node)

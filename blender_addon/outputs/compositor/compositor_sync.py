@@ -14,8 +14,8 @@ from ...scene import environment, frame_setup, sky_frames
 from ...scene.node_paths import Place
 from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
-from ..shared.compositor_tree import Setup, find_setup, find_tree, takes_sky_from_settings
-from ..shared.map_images import NO_MAP, plain_map, read_sequence
+from ..shared.compositor_tree import FOOTPRINT, Setup, find_node, find_setup, find_tree, takes_sky_from_settings
+from ..shared.map_images import NO_MAP, file_image, plain_map, read_sequence
 from . import depth, disk, sky_filter
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
@@ -105,15 +105,21 @@ def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
 
 def forget_loaded_map(scene: bpy.types.Scene) -> None:
     """Let Blender read the maps anew from their files."""
-    setup = find_setup(scene)
-    if setup is not None and setup.map is not None and setup.map.image is not None:
-        setup.map.image.reload()
-    tree = find_tree(scene)
-    if tree is not None:
-        sky_filter.forget_loaded(tree)
-    for node, _crossing in disk_sync.passes_of(tree) if tree is not None else ():
-        if node.image is not None:
-            node.image.reload()
+    for node in map_nodes(scene):
+        image = file_image(node)
+        if image is not None:
+            image.reload()
+            image.update_tag()  # else the viewport's compositor keeps what it has
+
+
+def map_nodes(scene: bpy.types.Scene) -> list[bpy.types.Node]:
+    """Return the nodes that read maps: the warp map's first, if it is there, then what lies beside it."""
+    setup, tree = find_setup(scene), find_tree(scene)
+    if tree is None:
+        return []
+    footprint = find_node(tree, FOOTPRINT)
+    beside = [node for node, _crossing in disk_sync.passes_of(tree)] + ([] if footprint is None else [footprint])
+    return beside if setup is None or setup.map is None else [setup.map, *beside]
 
 
 def sync_sky(scene: bpy.types.Scene) -> None:

@@ -6,6 +6,7 @@ import bpy
 from ...nodes import disk_group
 from ..shared import disk_sync
 from ..shared.compositor_tree import Setup, find_node, find_setup
+from ..shared.map_images import file_image
 
 SOCKET = "Disk"  # of the group "Umbra Black Hole"
 
@@ -20,8 +21,9 @@ def refresh(scene: bpy.types.Scene) -> None:
         disk_sync.remove(setup.tree)
         return
     disk_sync.update(scene, hole, _put_in(scene, setup))
-    if setup.map is not None and setup.map.image is not None:
-        disk_sync.point_passes(setup.tree, setup.map.image.filepath)
+    image = None if setup.map is None else file_image(setup.map)
+    if image is not None:
+        disk_sync.point_passes(setup.tree, image.filepath)
 
 
 def _put_in(scene: bpy.types.Scene, setup: Setup) -> bpy.types.Node:

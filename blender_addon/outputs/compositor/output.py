@@ -28,6 +28,7 @@ from ..shared.compositor_tree import (
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
 from . import compositing, compositor_sync, depth, disk, objects_behind, panel, sky_filter
+from .viewport import CompositorViewportMaps
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
 MOTION_BLUR = "Motion Blur is on: where camera or hole move, objects are blurred; sky, shadow and disk stay sharp."
@@ -46,6 +47,7 @@ class CompositorOutput(Output):
     label = "Compositor"
     description = "The sky is bent behind the render: every engine, and a new sky costs nothing"
     settings_label = "Sky"
+    viewport = CompositorViewportMaps()
 
     # --- setting a scene up -----------------------------------------------------------------------
 

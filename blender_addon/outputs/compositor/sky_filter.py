@@ -38,14 +38,6 @@ def point_at_footprints(tree: bpy.types.NodeTree, map_path: str) -> None:
         read_sequence(node, FOOTPRINT_IMAGE_NAME, physics.footprint_path(map_path))
 
 
-def forget_loaded(tree: bpy.types.NodeTree) -> None:
-    """Let Blender read the footprints and levels from their files again."""
-    for role in _SOCKETS:
-        node = find_node(tree, role)
-        if node is not None and node.image is not None:
-            node.image.reload()
-
-
 def sync(scene: bpy.types.Scene, setup: Setup, sky: bpy.types.Image) -> None:
     """Let the group read the levels of a sky, none if it is not filtered."""
     node = find_node(setup.tree, LEVELS)

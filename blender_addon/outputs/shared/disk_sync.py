@@ -15,7 +15,7 @@ from ...nodes import disk_group, disk_images
 from ...scene import disk_animation, frame_setup
 from ...settings import disk_properties
 from .compositor_tree import ROLE, find_node, find_tree
-from .map_images import keep_as_data, read_sequence
+from .map_images import drop_live, keep_as_data, read_sequence
 
 DISK = "disk"
 PICTURE_ROLES = {picture.socket: picture.role for picture in disk_images.PICTURES.values()}
@@ -158,6 +158,7 @@ def _remove_node(tree: bpy.types.NodeTree, role: str) -> None:
     node = find_node(tree, role)
     if node is None:
         return
+    drop_live(node)
     image = node.image
     tree.nodes.remove(node)
     if image is not None and image.users == 0 and role.startswith("disk_pass_"):

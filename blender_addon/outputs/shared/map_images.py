@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images that read maps: a file for each frame, or none at all until a valid map is there."""
+"""Images that read maps: a file for each frame, or none at all until a valid map is there.
+
+In the window's session a node may read a map in memory instead, a live one. The live image remembers the image that it
+stands for, so that the node can be given back to its files at any time: after undo too, when every datablock is
+another one, and in a file that Blender has saved by itself.
+"""
 
 import math
 import tempfile
@@ -7,6 +12,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...bake.names import SEQUENCE_LENGTH
 from ...core import color_spaces
@@ -18,6 +24,10 @@ NO_MAP = "no_warp_map_0001.exr"
 # Of a map that bends nothing: every pixel is valid and sees the same place of the sky.
 _PLAIN_MAP = "umbra_plain_map"
 _PLAIN = (0.5 * math.pi, 1.0, 1.0, 1.0)  # theta, phi, 1 + z, visibility
+
+# The custom property of a live image, and how its name begins.
+STANDS_FOR = "umbra_stands_for"
+LIVE_NAME = "Umbra Live"
 
 # Together these read file `frame % SEQUENCE_LENGTH` at every frame, before zero too; see bake/request.py.
 SEQUENCE_SETTINGS = {
@@ -49,6 +59,7 @@ def keep_as_data(image: bpy.types.Image) -> None:
 
 def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
     """Let an image node read one file for each frame."""
+    give_back(node)
     if node.image is None or node.image.source != "SEQUENCE":
         node.image = map_image(name)
     for name, value in SEQUENCE_SETTINGS.items():
@@ -71,3 +82,72 @@ def plain_map(frame: int) -> str:
             physics.write_exr(physics.pass_path(path, number), np.zeros((2, 2, 4), np.float32))
         physics.write_exr(path, np.full((2, 2, 4), _PLAIN, np.float32))
     return str(path)
+
+
+# --- live images ----------------------------------------------------------------------------------
+
+
+def pixels_of(*planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return four planes, row 0 at the top, as an image's pixels, row 0 at the bottom."""
+    return np.ascontiguousarray(np.stack(planes, axis=-1)[::-1], dtype=np.float32)
+
+
+def is_live(node: bpy.types.Node) -> bool:
+    """Return whether an image node reads a live image."""
+    return node.image is not None and STANDS_FOR in node.image
+
+
+def file_image(node: bpy.types.Node) -> bpy.types.Image | None:
+    """Return the image of the files that a node reads, or would read without its live image."""
+    image: bpy.types.Image | None = node.image
+    return image if image is None else image.get(STANDS_FOR, image)
+
+
+def show_live(node: bpy.types.Node, pixels: NDArray[np.float32]) -> None:
+    """Let an image node, which reads files, read these pixels, shape (height, width, 4), row 0 at the bottom."""
+    live = _live_of(node)
+    if live is None or (is_live(node) and live.users > 1):  # a copy of the tree reads it too
+        live = _make_live(file_image(node))
+    height, width = pixels.shape[:2]
+    if tuple(live.size) != (width, height):
+        live.generated_width, live.generated_height = width, height
+    live.pixels.foreach_set(pixels.ravel())
+    live.update()
+    live.update_tag()
+    if node.image != live:
+        node.image = live
+
+
+def show_live_again(node: bpy.types.Node) -> None:
+    """Let an image node read its live image once more, if there is one."""
+    live = _live_of(node)
+    if live is not None and node.image != live:
+        node.image = live
+
+
+def give_back(node: bpy.types.Node) -> None:
+    """Let an image node read its files again; the live image stays, to be used once more."""
+    if is_live(node):
+        node.image = file_image(node)
+
+
+def drop_live(node: bpy.types.Node) -> None:
+    """Let an image node read its files again, and free its live image."""
+    give_back(node)
+    live = _live_of(node)
+    if live is not None and live.users == 0:
+        bpy.data.images.remove(live)
+
+
+def _live_of(node: bpy.types.Node) -> bpy.types.Image | None:
+    if is_live(node):
+        return node.image
+    found = (each for each in bpy.data.images if each.users == 0 and each.get(STANDS_FOR) == node.image)
+    return None if node.image is None else next(found, None)
+
+
+def _make_live(stands_for: bpy.types.Image | None) -> bpy.types.Image:
+    image = bpy.data.images.new(LIVE_NAME, 1, 1, alpha=True, float_buffer=True, is_data=True)
+    keep_as_data(image)
+    image[STANDS_FOR] = stands_for
+    return image

@@ -57,6 +57,23 @@ def test_field_of_view():
             PerspectiveCamera.from_field_of_view(10, 10, wrong)
 
 
+@pytest.mark.parametrize(
+    "camera",
+    [
+        PerspectiveCamera(1920, 1079, 50.0, shift_x=0.2, shift_y=-0.1, pixel_aspect_y=1.5),
+        PerspectiveCamera(300, 700, 35.0, sensor_fit="VERTICAL"),
+        PerspectiveCamera(999, 1000, 35.0, shift_x=0.3),  # AUTO: with fewer pixels both sides may count as many
+        PanoramaCamera(600, 200, latitude_min=-0.5, longitude_max=2.0),
+    ],
+)
+def test_a_camera_with_fewer_pixels_sees_the_same(camera):
+    small = camera.resized(48, 27)
+    assert (small.width, small.height) == (48, 27)
+    across, down = np.random.default_rng(3).random((2, 100))
+    seen = small.directions(across * 48, down * 27)
+    np.testing.assert_allclose(seen, camera.directions(across * camera.width, down * camera.height), atol=1e-12)
+
+
 def test_panorama_covers_the_whole_sky_without_gap():
     camera = PanoramaCamera(360, 180)
     # Longitude 0 is straight ahead, the right side of the picture is to the right.

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the maps that the viewport's compositor shows are made from, and which files could take their place."""
+
+import math
+from dataclasses import replace
+
+import bpy
+
+from ..bake.request import MapRequest
+from ..core.physics_api import physics
+from ..outputs import frames
+from ..scene import frame_setup
+from ..scene.frame_setup import FrameSetup
+from ..settings.hole_properties import CAMERA_ANIMATION
+from ..settings.scene_properties import ACCURACIES
+
+Camera = physics.PerspectiveCamera | physics.PanoramaCamera
+
+# Pixels of the map that follows, and at the most of the one that takes its place; and those of the smallest that
+# follows on a slow machine: with fewer, stars are squares.
+SMALL_PIXELS, FULL_PIXELS, LEAST_PIXELS = 480 * 270, 1920 * 1080, 320 * 180
+
+# Error of interpolation of a small disk, radians: a few of its pixels. Less would take half as long again.
+DISK_INTERPOLATION = 1e-2
+
+
+def shrunk(camera: Camera, pixels: float) -> Camera:
+    """Return the camera that sees the same in at most so many pixels, about, of the same aspect."""
+    scale = min(math.sqrt(pixels / (camera.width * camera.height)), 1.0)
+    return camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
+
+
+def small(parameters: physics.WarpMapParameters, pixels: float = SMALL_PIXELS) -> physics.WarpMapParameters:
+    """Return what the small map of a frame is made from, without a disk."""
+    return _of_size(parameters, pixels, ACCURACIES["DRAFT"], None)
+
+
+def small_with_disk(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
+    """Return what the small map of a frame is made from, with its disk."""
+    tolerance, _ = ACCURACIES["DRAFT"]
+    return _of_size(parameters, SMALL_PIXELS, (tolerance, DISK_INTERPOLATION), parameters.disk)
+
+
+def full(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
+    """Return what the full map of a frame is made from, where its files are not up to date."""
+    return _of_size(parameters, FULL_PIXELS, ACCURACIES["STANDARD"], parameters.disk)
+
+
+def _of_size(
+    parameters: physics.WarpMapParameters, pixels: float, accuracy: tuple[float, float], disk: physics.Disk | None
+) -> physics.WarpMapParameters:
+    tolerance, interpolation = accuracy
+    return replace(
+        parameters,
+        camera=shrunk(parameters.camera, pixels),
+        supersampling=1,
+        tolerance=tolerance,
+        interpolation=interpolation,
+        method=physics.DEFAULT_METHOD,
+        disk=disk,
+    )
+
+
+def requests_of(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
+    """Return the files that a frame needs; none where it cannot have any.
+
+    The velocity of an animated camera was not measured, so that of the file is taken.
+    """
+    try:
+        requests = frames.requests_of(scene, frame)
+        if frame_setup.active_hole(scene).umbra.motion != CAMERA_ANIMATION:
+            return requests
+        return [replace(each, parameters=_with_velocity_of_file(each)) for each in requests]
+    except physics.BlackHoleError:
+        return []
+
+
+def _with_velocity_of_file(wanted: MapRequest) -> physics.WarpMapParameters:
+    made = wanted.kind.format.read_metadata(wanted.path)["parameters"]
+    return replace(wanted.parameters, velocity=physics.WarpMapParameters.from_metadata(made).velocity)
