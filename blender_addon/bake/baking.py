@@ -107,7 +107,7 @@ def prepare(wanted: MapRequest) -> None:
 
 def _save(wanted: MapRequest, baked: Any) -> None:
     """Write a map; this may run in a thread of its own, and touches nothing of Blender's."""
-    wanted.kind.write(wanted.path, baked)
+    wanted.write(baked)
     for older in older_maps(wanted):
         older.unlink(missing_ok=True)
 

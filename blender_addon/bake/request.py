@@ -3,11 +3,13 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from ..core.physics_api import physics
 from ..scene.frame_setup import FrameSetup
+from ..settings.scene_properties import looks_of
 from .folder import MapFolder, check_path, folder
 from .kinds import MapKind
 from .names import file_name
@@ -22,12 +24,29 @@ class MapRequest:
     kind: MapKind
     parameters: "physics.WarpMapParameters"
     folder: MapFolder
+    with_optional: bool = False
+    """Whether files lie beside the map that can be made from it at any time, such as its footprints."""
 
     def formats(self, path: Path | None = None) -> dict[Path, "physics.MapFormat"]:
         """Return all files of the request, the map first, with their formats; if wanted, of a map at another path."""
         place = self.path if path is None else path
-        beside = physics.files_beside(place, self.parameters) if self.kind.has_companions else ()
+        beside: tuple[tuple[Path, physics.MapFormat], ...] = ()
+        if self.kind.has_companions:
+            beside = physics.files_beside(place, self.parameters, optional=self.with_optional)
         return {place: self.kind.format, **dict(beside)}
+
+    def write(self, baked: Any) -> None:
+        """Write a map that was baked for the request, and what lies beside it.
+
+        Raises
+        ------
+        physics.ImageFileError
+            If a file cannot be written.
+        """
+        if self.kind.has_companions:
+            physics.write_map_files(self.path, baked, optional=self.with_optional)
+        else:
+            self.kind.write(self.path, baked)
 
     def lies_at(self, path: Path) -> bool:
         """Whether the map, with the files beside it, is at a path, by its headers."""
@@ -68,7 +87,7 @@ def request(
     name = file_name(scene, frame.hole_name, parameters.map_size, frame.frame, kind, parameters)
     path = where.path / name
     check_path(path)
-    wanted = MapRequest(frame.frame, path, kind, parameters, where)
+    wanted = MapRequest(frame.frame, path, kind, parameters, where, looks_of(scene.umbra) > 0)
     if kind.is_hashed and not path.exists():
         # It may have been baked where the last digits of its parameters, and so its name, were others.
         path = next((each for each in older_maps(wanted) if wanted.lies_at(each)), path)

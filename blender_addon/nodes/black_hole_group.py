@@ -234,6 +234,11 @@ def ensure_group(looks: int = 0) -> bpy.types.NodeTree:
     return group_of(looks).ensure()
 
 
+def find_group(looks: int = 0) -> bpy.types.NodeTree | None:
+    """Return this file's group for a number of looks, or None."""
+    return group_of(looks).find()
+
+
 def add_group_node(tree: bpy.types.NodeTree, looks: int = 0) -> bpy.types.Node:
     """Add a group node to a compositor tree."""
     ensure_group(looks)

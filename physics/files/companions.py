@@ -71,13 +71,22 @@ def write_companions(
             each.write(place(path), warp_map, number)
 
 
-def write_map_files(map_path: PathLike, warp_map: WarpMap) -> None:
+def write_map_files(map_path: PathLike, warp_map: WarpMap, *, optional: bool = True) -> None:
     """Write a warp map with the files beside it; the map comes last, so that where it is valid they are there.
+
+    Parameters
+    ----------
+    map_path : path
+        The map's.
+    warp_map : WarpMap
+        What was baked.
+    optional : bool
+        Whether to write those that can be made from the map at any time.
 
     Raises
     ------
     ImageFileError
         If a file cannot be written.
     """
-    write_companions(map_path, warp_map)
+    write_companions(map_path, warp_map, optional=optional)
     write_warp_map(map_path, warp_map)

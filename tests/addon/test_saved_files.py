@@ -90,7 +90,7 @@ def test_the_first_version_renders_as_numpy_does(tmp_path: Path) -> None:
     """Every pixel, against the reference in float64 from the map that is baked and the sky that is packed."""
     scene = opened(FIRST, tmp_path)
     picture = render(scene, tmp_path / "picture.exr", exr)
-    (path,) = (tmp_path / "maps").glob("*[0-9]_[0-9][0-9][0-9][0-9].exr")
+    (path,) = (tmp_path / "maps").glob("*.exr")
     warp_map = physics.read_warp_map(path)
     planes = np.stack([warp_map.theta, warp_map.phi, warp_map.one_plus_z, warp_map.visibility], axis=-1)
     expected = reference_render.render(
@@ -103,7 +103,6 @@ def test_the_first_version_renders_as_numpy_does(tmp_path: Path) -> None:
         brightness_amount=GROUP["Redshift Brightness"],
         temperature=GROUP["Sky Temperature"],
         output_size=(scene.render.resolution_x, scene.render.resolution_y),
-        looks=8,
     ).image
     # float32 in a dozen operations and in texture coordinates, of colors up to 10
     np.testing.assert_allclose(picture[..., :3], expected[..., :3], rtol=0.0, atol=2e-4)

@@ -53,7 +53,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
         return
     repair(scene, thorough=False)
     if setup.tree.library is None:
-        sky_filter.ensure_nodes(setup)
+        sky_filter.refresh_nodes(scene, setup)
     disk_light.refresh(scene, frame_setup.find_active_hole(scene))
     disk.refresh(scene)
     depth.refresh(scene)

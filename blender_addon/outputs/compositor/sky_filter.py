@@ -17,8 +17,11 @@ FOOTPRINT_IMAGE_NAME, LEVELS_IMAGE_NAME = "Umbra Footprint", "Umbra Sky Levels"
 _SOCKETS = {FOOTPRINT: black_hole_group.FOOTPRINT.name, LEVELS: black_hole_group.LEVELS.name}
 
 
-def ensure_nodes(setup: Setup) -> None:
-    """Give the group the nodes that it filters by."""
+def refresh_nodes(scene: bpy.types.Scene, setup: Setup) -> None:
+    """Give the group the nodes that it filters by, or take them out where it does not."""
+    if looks_of(scene.umbra) == 0:
+        remove(setup.tree)
+        return
     for index, (role, name) in enumerate(_SOCKETS.items()):
         node = find_node(setup.tree, role)
         if node is None:
