@@ -60,6 +60,7 @@ def test_one_click_and_render(
     scene.umbra.environment_image = environment_image()
     scene.umbra.environment_source = "IMAGE"
     assert bpy.ops.umbra.add_black_hole() == {"FINISHED"}
+    scene.umbra.hide_behind = False  # the hole is inside the cube
     picture = render(scene, tmp_path / "picture.exr", exr)
     (name,) = map_files(tmp_path)
     assert plain_name(name) == "Scene_Black_Hole_64x36_0001.exr"
