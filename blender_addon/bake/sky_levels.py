@@ -14,7 +14,7 @@ from ..core import color_spaces
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
-from ..scene import sky_frames
+from ..scene.sky import sky_frames
 from .folder import folder
 
 # Raised whenever the levels of an image, or their file, change.

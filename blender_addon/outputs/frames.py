@@ -16,8 +16,9 @@ from ..bake.request import MapRequest
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import scene_of
-from ..scene import drivers, environment, frame_setup, presence
+from ..scene import drivers, frame_setup, presence
 from ..scene.frame_setup import FrameSetup
+from ..scene.sky import environment
 from . import registry
 from .shared import compositor_tree
 

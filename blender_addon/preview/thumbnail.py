@@ -15,7 +15,7 @@ from ..core import color_spaces
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import registry
-from ..scene import environment
+from ..scene.sky import environment
 from ..settings.scene_properties import SKY_PROPERTIES
 
 # Pixels of the longer side.

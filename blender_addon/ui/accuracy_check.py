@@ -11,7 +11,8 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
-from ..scene import environment, frame_setup
+from ..scene import frame_setup
+from ..scene.sky import environment
 from .bake_operators import BakeOperator, Steps
 from .sidebar import HolePanel
 from .status import wrapped

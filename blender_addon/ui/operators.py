@@ -7,7 +7,8 @@ from ..core.physics_api import physics
 from ..outputs import registry, switching
 from ..outputs.compositor.output import CompositorOutput
 from ..outputs.lens import foreground
-from ..scene import environment, frame_setup
+from ..scene import frame_setup
+from ..scene.sky import environment
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
 from . import engines

@@ -10,7 +10,8 @@ import bpy
 
 from ..core.physics_api import physics
 from ..outputs import switched
-from ..scene import environment, frame_setup
+from ..scene import frame_setup
+from ..scene.sky import environment
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 

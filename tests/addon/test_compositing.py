@@ -17,7 +17,7 @@ def tree_module(addon_module: Callable[[str], ModuleType]) -> ModuleType:
 
 @pytest.fixture
 def environment(addon_module: Callable[[str], ModuleType]) -> ModuleType:
-    return addon_module("scene.environment")
+    return addon_module("scene.sky.environment")
 
 
 @pytest.fixture
@@ -291,7 +291,7 @@ def test_the_default_world_brings_the_real_stars(
 ) -> None:
     add_hole(scene, sky=False)
     exposure = tree_module.find_setup(scene).group.inputs["Exposure"]
-    assert exposure.default_value == addon_module("scene.environment").STAR_SKY_EXPOSURE
+    assert exposure.default_value == addon_module("scene.sky.environment").STAR_SKY_EXPOSURE
     exposure.default_value = 1.0  # the artist's own stays
     assert bpy.ops.umbra.use_star_sky() == {"FINISHED"}
     assert exposure.default_value == 1.0

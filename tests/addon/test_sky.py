@@ -297,7 +297,7 @@ def bare(scene: bpy.types.Scene, name: str) -> None:
 
 @pytest.fixture
 def panorama(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    module = addon_module("scene.panorama")
+    module = addon_module("scene.sky.panorama")
     monkeypatch.setattr(module, "PROCEDURAL_WIDTH", WIDTH)
     return module
 
@@ -346,7 +346,7 @@ def test_a_panorama_is_kept_until_the_world_changes(
     scene: bpy.types.Scene, tmp_path: Path, panorama: ModuleType, addon_module: Callable[[str], ModuleType]
 ) -> None:
     error = addon_module("core.errors").SceneError
-    environment = addon_module("scene.environment")
+    environment = addon_module("scene.sky.environment")
     bare(scene, "gamma")
     add_hole(scene, sky=False)
     image = environment.read(scene).image
@@ -408,7 +408,7 @@ def test_what_only_turns_a_part_of_the_world_is_not_followed(
 ) -> None:
     bare(scene, "hue and saturation")
     tree, nodes = scene.world.node_tree, scene.world.node_tree.nodes
-    followed = addon_module("scene.followed")
+    followed = addon_module("scene.sky.followed")
     assert followed.of(scene.world, nodes["World Output"]).rotation is None  # nothing turns it
     mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
     texture = next(node for node in nodes if node.type == "TEX_ENVIRONMENT")
@@ -450,7 +450,7 @@ def test_a_world_that_no_image_can_show_is_left_out_with_the_reason(
     reason = {"animated": "is animated", "camera": "from each camera", "tiles": "UDIM tiles"}[kind]
     assert reason in said
     assert scene.umbra.environment_image.name == STAR_SKY
-    assert reason in addon_module("scene.environment").world_left_out(scene)
+    assert reason in addon_module("scene.sky.environment").world_left_out(scene)
     if kind == "animated":
         bpy.ops.umbra.set_output(output="WORLD")
         assert scene.umbra.environment_source == "WORLD"
@@ -557,7 +557,7 @@ def test_the_file_of_a_frame_is_the_one_that_blender_reads(
     user = panorama_of(scene.world.node_tree, image).image_user
     user.frame_duration, user.frame_start, user.frame_offset, user.use_cyclic = 3, 2, 4, cyclic
     bpy.data.objects.remove(bpy.data.objects["Cube"])
-    sky_frames = addon_module("scene.sky_frames")
+    sky_frames = addon_module("scene.sky.sky_frames")
     for frame in (0, 1, 2, 3, 4, 5, 6, 8):
         scene.frame_set(frame)
         shown = float(corner(render(scene, tmp_path / "own.exr", exr))[0]) / 0.2

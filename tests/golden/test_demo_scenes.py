@@ -91,7 +91,7 @@ def rendered(composed: object, addon_module: Callable[[str], ModuleType], tmp_pa
     for link in list(group.outputs["Image"].links):
         tree.links.new(layers, link.to_socket)
     foreground = _render(scene, tmp_path / "foreground.exr")
-    sky = addon_module("scene.environment").read(scene)
+    sky = addon_module("scene.sky.environment").read(scene)
     rotation = sky.rotation if sky.rotation_at else tuple(inputs["Environment Rotation"].default_value)
     reference = reference_render.render(
         read_warp_map(map_path),

@@ -10,8 +10,9 @@ from ...bake.kinds import WARP_MAP
 from ...bake.names import sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
-from ...scene import environment, frame_setup, sky_frames
-from ...scene.node_paths import Place
+from ...scene import frame_setup
+from ...scene.sky import environment, sky_frames
+from ...scene.sky.node_paths import Place
 from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import FOOTPRINT, Setup, find_node, find_setup, find_tree, takes_sky_from_settings

@@ -11,9 +11,10 @@ from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment, frame_setup, instanced_hole, panorama, sky_frames
+from ...scene import frame_setup, instanced_hole
 from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
+from ...scene.sky import environment, panorama, sky_frames
 from ..protocol import Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import (

@@ -7,7 +7,7 @@ from ...bake import sky_levels
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
-from ...scene import environment, sky_frames
+from ...scene.sky import environment, sky_frames
 from ...settings.scene_properties import looks_of
 from ..shared.compositor_tree import FOOTPRINT, LEVELS, ROLE, Setup, find_node, find_nodes, takes_sky_from_settings
 from ..shared.map_images import read_sequence

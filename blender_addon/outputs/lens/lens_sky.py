@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from ...scene import environment, image_world
+from ...scene.sky import environment, image_world
 from ..protocol import Look
 from ..shared.look import EXPOSURE, PLACEMENT
 

@@ -10,9 +10,10 @@ from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
-from ...scene import environment, frame_setup
+from ...scene import frame_setup
 from ...scene.camera_type import is_converted
 from ...scene.frame_setup import FrameSetup
+from ...scene.sky import environment
 from ...settings.hole_properties import CAMERA_ANIMATION
 from ..protocol import FrameCarrier, Look, Notice, Output
 from ..shared import disk_sync, leaving, sequencer, world_files

@@ -4,8 +4,8 @@
 import bpy
 
 from ...nodes.world_nodes import MAP_ROLE
-from ...scene import sky_frames
-from ...scene.node_paths import reachable, world_output
+from ...scene.sky import sky_frames
+from ...scene.sky.node_paths import reachable, world_output
 
 
 def check(scene: bpy.types.Scene) -> None:

@@ -14,8 +14,8 @@ import bpy
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
-from ...scene import environment, image_world
-from ...scene.node_paths import SHINING
+from ...scene.sky import environment, image_world
+from ...scene.sky.node_paths import SHINING
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"

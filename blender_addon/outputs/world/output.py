@@ -10,9 +10,9 @@ from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import world_group
-from ...scene import environment
 from ...scene.frame_setup import FrameSetup, Traits
 from ...scene.shutter import Motion
+from ...scene.sky import environment
 from ..protocol import Look, Notice, Output
 from ..shared import sequencer, world_files
 from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group

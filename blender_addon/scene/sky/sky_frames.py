@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import SceneError
+from ...core.errors import SceneError
 
 SETTINGS = ("frame_duration", "frame_start", "frame_offset", "use_cyclic")
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from ..core.blender_version import NODES_ARE_OPTIONAL
+from ...core.blender_version import NODES_ARE_OPTIONAL
 from . import sky_frames
 
 # Kinds of the chain's nodes, the socket by which each feeds the next, and the socket of that.

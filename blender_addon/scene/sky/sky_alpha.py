@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.session import SESSION, Life
+from ...core.session import SESSION, Life
 from . import sky_frames
 
 # How images use their alpha where it darkens them.

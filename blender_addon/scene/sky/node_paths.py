@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..core.blender_version import NODES_ARE_OPTIONAL
+from ...core.blender_version import NODES_ARE_OPTIONAL
 
 # Kinds of nodes that make light of a color and a strength; in a World, Emission shines as Background does.
 SHINING = frozenset({"BACKGROUND", "EMISSION"})

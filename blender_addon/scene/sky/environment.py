@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
-from ..core import color_spaces
-from ..core.blender_version import NODES_ARE_OPTIONAL
-from ..core.errors import SceneError
-from ..core.physics_api import PACKAGE, physics
+from ...core import color_spaces
+from ...core.blender_version import NODES_ARE_OPTIONAL
+from ...core.errors import SceneError
+from ...core.physics_api import PACKAGE, physics
 from . import followed, panorama, sky_alpha, sky_frames, world_digest
 from .node_paths import SHINING, Place, source, world_output
 

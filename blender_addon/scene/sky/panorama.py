@@ -17,9 +17,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.errors import SceneError
-from ..core.physics_api import physics
-from ..core.session import SESSION, Life
+from ...core.errors import SceneError
+from ...core.physics_api import physics
+from ...core.session import SESSION, Life
 from . import followed, image_world, sky_frames, world_digest
 from .followed import Followed
 from .node_paths import reachable
