@@ -16,7 +16,8 @@ import bpy
 
 from ..bake.request import MapRequest
 from ..core.physics_api import physics
-from ..scene.frame_setup import PLAIN, FrameSetup, Traits
+from ..scene.cameras import PLAIN, Traits
+from ..scene.frame_setup import FrameSetup
 
 # Values by the names of the group "Umbra Black Hole"'s sockets: how the artist has set the sky, whatever shows it.
 Look = dict[str, Any]

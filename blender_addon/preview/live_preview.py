@@ -19,7 +19,7 @@ from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
-from ..scene import frame_setup
+from ..scene import cameras, frame_setup
 from ..settings.scene_properties import ACCURACIES
 from . import thumbnail
 
@@ -216,9 +216,9 @@ def _camera_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup
 ) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
     """What the thumbnail is seen by; for a lens that only the World knows, all directions."""
-    data = frame_setup.active_camera(scene).evaluated_get(depsgraph).data
+    data = cameras.active_camera(scene).evaluated_get(depsgraph).data
     try:
-        return frame_setup.camera_model(data, scene.render, scene.render.engine)
+        return cameras.camera_model(data, scene.render, scene.render.engine)
     except SceneError:
         return frame.parameters.camera
 

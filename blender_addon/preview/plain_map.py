@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.physics_api import physics
 from ..outputs import registry
-from ..scene import frame_setup
+from ..scene import cameras, frame_setup
 from .small_maps import SMALL_PIXELS, Camera, shrunk
 
 
@@ -30,8 +30,8 @@ def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> View:
     SceneError
         There is no camera, or one that no map can be made for.
     """
-    camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
-    model = frame_setup.camera_model(camera.data, scene.render, scene.render.engine, registry.of(scene).traits)
+    camera = cameras.active_camera(scene).evaluated_get(depsgraph)
+    model = cameras.camera_model(camera.data, scene.render, scene.render.engine, registry.of(scene).traits)
     pose = frame_setup.pose(camera, "The camera", keep_scale=False)
     return View(shrunk(model, SMALL_PIXELS), tuple(float(each) for each in np.ravel(pose.rotation)))
 

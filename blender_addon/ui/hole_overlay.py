@@ -6,7 +6,6 @@ from __future__ import annotations
 import bpy
 import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
@@ -51,7 +50,9 @@ def _draw() -> None:
     shader.uniform_float("color", (*_color(context, hole), 1.0))
     for line in lines:
         closed = [*line.tolist(), line[0].tolist()]
-        batch_for_shader(shader, "LINE_STRIP", {"pos": closed}).draw(shader)
+        points = gpu.types.GPUVertBuf(shader.format_calc(), len(closed))
+        points.attr_fill("pos", closed)
+        gpu.types.GPUBatch(type="LINE_STRIP", buf=points).draw(shader)
     gpu.state.blend_set("NONE")
     gpu.state.depth_test_set("NONE")
 

@@ -6,7 +6,7 @@ import bpy
 from ..core.errors import SceneError
 from ..outputs import registry
 from ..preview import viewport, views
-from ..scene import frame_setup
+from ..scene import cameras
 from .reporting import reporting
 
 
@@ -38,7 +38,7 @@ class UMBRA_OT_show_in_viewport(bpy.types.Operator):
                 "Up Compositor, and switch its node on.",
                 code="compositor.not-linked",
             )
-        frame_setup.active_camera(scene)
+        cameras.active_camera(scene)
         for area in areas:
             if not views.shows_composite(area.spaces.active):
                 views.show(area)

@@ -10,7 +10,7 @@ from ...bake.kinds import WARP_MAP
 from ...bake.names import sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.sky import environment, sky_frames
 from ...scene.sky.node_paths import Place
 from ...settings.scene_properties import looks_of
@@ -80,7 +80,7 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
     """
     hole = frame_setup.active_hole(scene)
     samples = int(scene.umbra.supersampling)
-    width, height = frame_setup.render_size(scene.render)
+    width, height = cameras.render_size(scene.render)
     size = (width * samples, height * samples)
     _set_map_path(scene, sequence_path(scene, hole.name, size, WARP_MAP))
 

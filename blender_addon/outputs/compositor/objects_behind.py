@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.rotations import Matrix
 
 # Types that a camera sees.
@@ -18,7 +18,7 @@ def find(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[str]:
 
     Instances do not count: a scene may have millions.
     """
-    camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
+    camera = cameras.active_camera(scene).evaluated_get(depsgraph)
     hole = frame_setup.active_hole(scene).evaluated_get(depsgraph)
     to_camera = np.array(camera.matrix_world.normalized().inverted())
     place = (to_camera @ np.array([*hole.matrix_world.translation, 1.0]))[:3]

@@ -9,7 +9,7 @@ are shared: those of the collection "Umbra Foreground" are seen by the plain cam
 import bpy
 
 from ...core.errors import SceneError
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.camera_type import original_type
 from .. import registry
 from ..shared import tree_editing
@@ -129,7 +129,7 @@ def _make_plain(second: bpy.types.Scene) -> None:
 
 def _follow_camera(scene: bpy.types.Scene, second: bpy.types.Scene) -> None:
     """Give the second scene a camera that goes where the first one goes and sees what that saw before the lens."""
-    camera = frame_setup.active_camera(scene)
+    camera = cameras.active_camera(scene)
     if second.camera is None:
         data = camera.data.copy()
         lens_camera.restore(data)
@@ -175,7 +175,7 @@ def _share_objects(scene: bpy.types.Scene, second: bpy.types.Scene, front: bpy.t
         back = bpy.data.collections.new(BACKGROUND_NAME)
         root.children.link(back)
     wanted = {each.name for layer in scene.view_layers for each in layer.objects}
-    wanted -= {each.name for each in front.all_objects} | {frame_setup.active_camera(scene).name}
+    wanted -= {each.name for each in front.all_objects} | {cameras.active_camera(scene).name}
     for each in [each for each in back.objects if each.name not in wanted]:
         back.objects.unlink(each)
     for name in sorted(wanted - {each.name for each in back.objects}):

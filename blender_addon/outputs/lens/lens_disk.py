@@ -17,7 +17,7 @@ from ...bake.names import sequence_path
 from ...bake.request import MapRequest, request
 from ...core.physics_api import physics
 from ...nodes import disk_group
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ..shared import disk_sync, tree_editing
 from ..shared.compositor_tree import find_node, find_tree, has_scene_tree, render_layers
 from ..shared.map_images import NO_MAP, plain_map
@@ -122,7 +122,7 @@ def point_at_passes(scene: bpy.types.Scene) -> None:
         return
     samples = int(scene.umbra.supersampling)
     part = _part(scene)
-    width, height = frame_setup.render_size(scene.render) if part is None else part[2:]
+    width, height = cameras.render_size(scene.render) if part is None else part[2:]
     size = (width * samples, height * samples)
     disk_sync.point_passes(tree, sequence_path(scene, hole.name, size, WARP_MAP))
 
@@ -147,7 +147,7 @@ def _part(scene: bpy.types.Scene) -> tuple[int, int, int, int] | None:
     render = scene.render
     if not (render.use_border and render.use_crop_to_border):
         return None
-    width, height = frame_setup.render_size(render)
+    width, height = cameras.render_size(render)
     # Blender multiplies in single precision, and cuts off.
     left, right = (int(np.float32(each) * np.float32(width)) for each in (render.border_min_x, render.border_max_x))
     low, high = (int(np.float32(each) * np.float32(height)) for each in (render.border_min_y, render.border_max_y))

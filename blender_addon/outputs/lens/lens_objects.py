@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.rotations import Matrix, Vector
 from . import lens_disk
 
@@ -39,7 +39,7 @@ def place(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_s
     nearer: set[str] = set()
     amid: set[str] = set()
     hole = frame_setup.pose(frame_setup.active_hole(scene).evaluated_get(depsgraph), "The black hole", keep_scale=True)
-    middle = np.array(frame_setup.active_camera(scene).evaluated_get(depsgraph).matrix_world.translation)
+    middle = np.array(cameras.active_camera(scene).evaluated_get(depsgraph).matrix_world.translation)
     middle = 0.5 * (middle + hole.position)
     half = float(np.linalg.norm(middle - hole.position))
     sphere = scene.umbra.sphere_radius * frame.length_of_m

@@ -10,13 +10,13 @@ import bpy
 from ...core.blender_version import OSL_COUNTS_ROWS_UPWARDS
 from ...core.errors import SceneError
 from ...core.physics_api import physics
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.camera_type import is_converted
 from ...settings.scene_properties import EXIT_MAP
 from . import lens_camera, lens_shader
 
 # A camera that bends its rays can render a part of the picture.
-TRAITS = frame_setup.Traits(crops=True, blurs=False)
+TRAITS = cameras.Traits(crops=True, blurs=False)
 # Of the viewport, which does not blur.
 LIVE_TRAITS = replace(TRAITS, blurs=True)
 
@@ -81,7 +81,7 @@ def camera_of(scene: bpy.types.Scene) -> bpy.types.Camera:
     SceneError
         If there is no camera, or it cannot be converted.
     """
-    camera: bpy.types.Camera = frame_setup.active_camera(scene).data
+    camera: bpy.types.Camera = cameras.active_camera(scene).data
     lens_camera.convert(camera)
     return camera
 

@@ -10,7 +10,7 @@ from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.session import SESSION, Life
-from ...scene import frame_setup
+from ...scene import cameras, frame_setup
 from ...scene.camera_type import is_converted
 from ...scene.frame_setup import FrameSetup
 from ...scene.sky import environment
@@ -53,7 +53,7 @@ class LensOutput(Output):
             check_shared(scene, tree)
         if scene.umbra.environment_source == "IMAGE" and scene.umbra.environment_image is not None:
             environment.chosen_image(scene)
-        frame_setup.active_camera(scene)
+        cameras.active_camera(scene)
         for camera in lens_camera.cameras_of(scene):
             lens_camera.check(camera)
         lens_shader.bytecode(uses_map=False)
@@ -149,7 +149,7 @@ class LensOutput(Output):
             lens_disk.point_at_passes(scene)
         warnings = lens_objects.warnings(scene, depsgraph, frame)
         if scene.umbra.foreground_scene is not None:
-            camera = frame_setup.active_camera(scene).evaluated_get(depsgraph)
+            camera = cameras.active_camera(scene).evaluated_get(depsgraph)
             foreground.copy_lens(scene.umbra.foreground_scene, camera.data)
         path = _exit_map(scene, frame).path if lens_sync.uses_maps(scene) else None
         lens_sync.show(scene, frame, path)

@@ -10,7 +10,8 @@ from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import world_group
-from ...scene.frame_setup import FrameSetup, Traits
+from ...scene.cameras import Traits
+from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
 from ...scene.sky import environment
 from ..protocol import Look, Notice, Output
