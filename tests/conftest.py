@@ -23,6 +23,10 @@ USER_RESOURCES = Path(tempfile.mkdtemp(prefix="umbra-tests-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(USER_RESOURCES)
 atexit.register(shutil.rmtree, USER_RESOURCES, ignore_errors=True)
 
+# Many tests start processes, which would compile the extension and the package again each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:

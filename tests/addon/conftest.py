@@ -7,12 +7,24 @@ from types import ModuleType
 
 import bpy  # before any test module asks for addon_utils, which comes with it
 import pytest
+import ready_groups
 from small_scene import shrink
 
 
+@pytest.fixture(scope="session")
+def _ready_groups(addon_module: Callable[[str], ModuleType], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the node groups that are built already."""
+    ready_groups.install(addon_module)
+    return tmp_path_factory.mktemp("groups")
+
+
 @pytest.fixture(autouse=True)
-def _factory_scene(factory_scene: None) -> None:
-    """Reset Blender for each test in this folder."""
+def _factory_scene(
+    factory_scene: None, _ready_groups: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reset Blender for each test in this folder; those of the node groups build them all."""
+    if not request.path.name.startswith("test_node_"):
+        monkeypatch.setenv(ready_groups.FOLDER, str(_ready_groups))
 
 
 @pytest.fixture

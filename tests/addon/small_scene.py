@@ -17,6 +17,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = (64, 36)
 PROCESS_TIMEOUT = 300  # seconds
+EXTENSION = "bl_ext.user_default.umbra_black_hole"
 
 
 def shrink(scene: bpy.types.Scene, size: tuple[int, int] = SIZE) -> None:
@@ -101,7 +102,12 @@ def add_hole(scene: bpy.types.Scene, *, sky: bool = True, **settings: object) ->
 
 
 def render(scene: bpy.types.Scene, path: Path, exr: ModuleType) -> np.ndarray:
-    """Render the current frame to an EXR; its pixels, row 0 at the top."""
+    """Render the current frame to an EXR; its pixels, row 0 at the top.
+
+    Cycles makes no table of the World's light by itself, which would take longer than the render.
+    """
+    if scene.world is not None and scene.world.cycles.sampling_method == "AUTOMATIC":
+        scene.world.cycles.sampling_method = "NONE"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True, scene=scene.name)
     return read(path, exr)
@@ -193,5 +199,10 @@ def _script(code: str, *, enable: bool = True) -> list[str]:
     """The command that runs a script with the tools of these tests, and with the extension unless told otherwise."""
     begin = f"import bpy\nimport sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
     if enable:
-        begin += "bpy.ops.preferences.addon_enable(module='bl_ext.user_default.umbra_black_hole')\n"
+        begin += f"""
+import importlib
+import ready_groups
+bpy.ops.preferences.addon_enable(module={EXTENSION!r})
+ready_groups.install(lambda name: importlib.import_module(f"{EXTENSION}.{{name}}"))
+"""
     return [sys.executable, "-c", begin + code]
