@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other add-ons whose handlers move camera or hole in a render: sky and scene are of one place, or refused."""
+"""Other add-ons whose handlers move camera or hole in a render: sky and scene are of one place, or refused.
+
+What is refused ends its process; the other renders share one.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,13 +25,14 @@ scene.umbra.map_folder = str(folder / "maps")
 scene.render.filepath = str(folder / "picture_")
 hole = add_hole(scene, mass_scale=1.0)
 bpy.ops.umbra.set_output(output={output!r})
+scene.world.cycles.sampling_method = "NONE"  # a table of the sky's light would take longer than the render
 handlers = bpy.app.handlers
 def move(scene, *_):
     scene.camera.location = (5.0 + scene.frame_current, -7.0, 5.0)
 """
 
-RENDER = """
-bpy.ops.render.render(animation=True)
+RENDER = "bpy.ops.render.render(animation=True)\n"
+END = """
 for f in (move, ours):
     while f in handlers.frame_change_post:
         handlers.frame_change_post.remove(f)
@@ -40,6 +44,7 @@ OURS = "ours = handlers.frame_change_post[0]\n"
 EXPECTED = [(6.0, -7.0, 5.0), (7.0, -7.0, 5.0)]
 
 Places = Callable[[], list[tuple[float, ...]]]
+Play = Callable[..., str]
 
 
 @pytest.fixture
@@ -54,15 +59,45 @@ def places(addon_module: Callable[[str], ModuleType], tmp_path: Path) -> Places:
     return read
 
 
-def play(tmp_path: Path, change: str, output: str = "COMPOSITOR") -> str:
-    """Render two frames with a change before; the error of a render that is refused, else nothing."""
-    result = run_python(BEGIN.format(folder=str(tmp_path), output=output) + OURS + change + RENDER)
+@pytest.fixture
+def told(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Sentences of renders that are refused; without a window they would end the process."""
+    shown: list[str] = []
+    monkeypatch.setattr(addon_module("core.messages"), "popup", shown.append)
+    monkeypatch.setattr(addon_module("core.messages"), "without_window", lambda: False)
+    return shown
+
+
+def script(folder: Path, change: str, output: str) -> str:
+    """Render two frames with a change before."""
+    return BEGIN.format(folder=str(folder), output=output) + OURS + change + RENDER
+
+
+@pytest.fixture
+def play(told: list[str], capfd: pytest.CaptureFixture[str]) -> Play:
+    """A function that runs the script in a new file, and says why a frame is refused, or nothing."""
+
+    def run(folder: Path, change: str, output: str = "COMPOSITOR") -> str:
+        bpy.ops.wm.read_homefile(use_factory_startup=True)  # removes the handlers of the time before
+        told.clear()
+        exec(script(folder, change, output), {"bpy": bpy})
+        error = capfd.readouterr().err
+        assert "Traceback" not in error, error
+        return " ".join(told)
+
+    return run
+
+
+def refusal(folder: Path, change: str) -> str:
+    """Run the script in a process of its own, which has to be refused; the error."""
+    result = run_python(script(folder, change, "COMPOSITOR") + END)
     assert "Traceback" not in result.stderr, result.stderr
-    return result.stderr if refused(result) else ""
+    assert refused(result)
+    return result.stderr
 
 
 @pytest.mark.parametrize("output", ["COMPOSITOR", "WORLD", "CYCLES_LENS"])
-def test_a_handler_that_moves_the_camera(tmp_path: Path, output: str) -> None:
+def test_a_handler_that_moves_the_camera(tmp_path: Path, play: Play, output: str) -> None:
     """Blender renders from the new place, and so the map is of that place: the only one that is baked."""
     assert not play(tmp_path, "handlers.frame_change_post.append(move)\n", output)
     assert len(list((tmp_path / "maps").glob("*.exr"))) == 2
@@ -96,7 +131,7 @@ handlers.frame_change_post.append(carry)
     ],
     ids=["before ours", "attached late", "persistent data", "update", "constraint", "hole"],
 )
-def test_other_ways_to_move(tmp_path: Path, places: Places, change: str) -> None:
+def test_other_ways_to_move(tmp_path: Path, play: Play, places: Places, change: str) -> None:
     assert not play(tmp_path, change)
     np.testing.assert_allclose(places(), EXPECTED, rtol=1e-6)
 
@@ -128,10 +163,10 @@ handlers.render_stats.append(lift)
     ids=["moves itself", "always last", "while rendering"],
 )
 def test_what_cannot_be_followed_is_refused(tmp_path: Path, change: str) -> None:
-    assert "[render." in play(tmp_path, change)
+    assert "[render." in refusal(tmp_path, change)
 
 
-def test_persistent_data_keeps_what_changes(tmp_path: Path, exr: ModuleType) -> None:
+def test_persistent_data_keeps_what_changes(tmp_path: Path, play: Play, exr: ModuleType) -> None:
     """Cycles updates only what it is told of: an object that moves is not left where it was in the frame before."""
     change = """
 scene.render.use_persistent_data = {persistent}
@@ -163,12 +198,12 @@ def carry(scene, *_):
     scene.camera.location.x += 0.5
 handlers.frame_change_post.append(carry)
 """
-    assert "[render.moved]" in play(tmp_path, change)
+    assert "[render.moved]" in refusal(tmp_path, change)
 
 
 @pytest.mark.parametrize("output", ["COMPOSITOR", "WORLD", "CYCLES_LENS"])
 @pytest.mark.parametrize("event", ["render_pre", "frame_change_post"])
-def test_a_handler_that_renames_the_scene(tmp_path: Path, output: str, event: str, exr: ModuleType) -> None:
+def test_a_handler_that_renames_the_scene(tmp_path: Path, play: Play, output: str, event: str, exr: ModuleType) -> None:
     """What is remembered of a scene goes by its number in the session, not by its name."""
     change = "def rename(scene, *_):\n    scene.name = f'S {scene.frame_current}'\n"
     pictures = []
@@ -181,4 +216,4 @@ def test_a_handler_that_renames_the_scene(tmp_path: Path, output: str, event: st
         assert not error
         pictures.append([exr.read_exr(each)[0] for each in sorted(folder.glob("picture_*.exr"))])
     np.testing.assert_array_equal(*pictures)
-    assert bpy.context.scene.name == "Scene"
+    assert bpy.context.scene.name.startswith("S ")
