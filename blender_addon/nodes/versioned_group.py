@@ -200,13 +200,14 @@ def _describe(item: bpy.types.NodeTreeInterfaceSocket, spec: SocketSpec) -> None
 def _fingerprint(tree: bpy.types.NodeTree) -> str:
     """Hash of all that determines a group's result; positions and names of nodes do not count."""
     order = {node: index for index, node in enumerate(tree.nodes)}
+    of_all = {each.identifier for each in bpy.types.Node.bl_rna.properties}
+    names: dict[str, list[str]] = {}  # of the settings that are text or switches, by the nodes' type
     lines = [_interface_line(item) for item in tree.interface.items_tree]
     for node, index in order.items():
-        settings = [
-            f"{name}={getattr(node, name)}"
-            for name in sorted(property_.identifier for property_ in node.bl_rna.properties)
-            if name not in bpy.types.Node.bl_rna.properties and isinstance(getattr(node, name), str | bool)
-        ]
+        if node.bl_idname not in names:
+            own = {each.identifier for each in node.bl_rna.properties} - of_all
+            names[node.bl_idname] = sorted(name for name in own if isinstance(getattr(node, name), str | bool))
+        settings = [f"{name}={getattr(node, name)}" for name in names[node.bl_idname]]
         values = [_value_text(socket) for socket in node.inputs if not socket.is_linked]
         lines.append(f"{index} {node.bl_idname} mute={node.mute} {settings} {values}")
     lines.extend(

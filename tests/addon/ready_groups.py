@@ -54,7 +54,7 @@ def _path(group: object) -> Path | None:
     folder = os.environ.get(FOLDER)
     if not folder:
         return None
-    kind = f"{group.name} {group.version} {group.inputs} {group.outputs} {bpy.app.version}"
+    kind = f"{group.name} {group.version} {group.variant} {group.inputs} {group.outputs} {bpy.app.version}"
     return Path(folder, f"{hashlib.sha256(kind.encode()).hexdigest()[:16]}.blend")
 
 
