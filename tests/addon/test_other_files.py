@@ -77,7 +77,12 @@ def test_a_hole_of_another_file_is_set_up_as_a_new_one(
     assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
     assert f'World "World" is a plain color: the sky is the image "{STAR_SKY}"' in capfd.readouterr().out
     assert other.umbra.active_hole is not None
+    assert (other.umbra.hide_behind, other.view_layers[0].use_pass_z) == (True, True)
     np.testing.assert_array_equal(render(other, tmp_path / "other.exr", exr), picture)
+    other.umbra.hide_behind = False
+    assert bpy.ops.umbra.remove_compositor() == {"FINISHED"}
+    assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
+    assert not other.umbra.hide_behind  # the artist's choice stays
 
 
 @pytest.mark.parametrize("how", ["append", "link"])

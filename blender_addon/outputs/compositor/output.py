@@ -119,9 +119,13 @@ class CompositorOutput(Output):
         if not has_holes:
             instanced_hole.check(scene)
         if has_holes and find_setup(scene) is None:
-            if scene.umbra.active_hole is None:
+            is_new_here = scene.umbra.active_hole is None
+            if is_new_here:
                 scene.umbra.active_hole = frame_setup.find_active_hole(scene)
-            return self.on_hole_added(scene)
+            notes = self.on_hole_added(scene)
+            if is_new_here:
+                scene.umbra.hide_behind = True
+            return notes
         return _prepare(scene) + compositing.set_up(scene) + _alpha_note(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
