@@ -292,6 +292,10 @@ def test_the_default_world_brings_the_real_stars(
     add_hole(scene, sky=False)
     exposure = tree_module.find_setup(scene).group.inputs["Exposure"]
     assert exposure.default_value == addon_module("scene.sky.environment").STAR_SKY_EXPOSURE
+    bpy.ops.umbra.remove_compositor()  # and with the group its exposure
+    assert bpy.ops.umbra.setup_compositor() == {"FINISHED"}
+    exposure = tree_module.find_setup(scene).group.inputs["Exposure"]
+    assert exposure.default_value == addon_module("scene.sky.environment").STAR_SKY_EXPOSURE
     exposure.default_value = 1.0  # the artist's own stays
     assert bpy.ops.umbra.use_star_sky() == {"FINISHED"}
     assert exposure.default_value == 1.0

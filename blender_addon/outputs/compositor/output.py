@@ -148,7 +148,7 @@ class CompositorOutput(Output):
         if tree is not None:
             check_shared(scene, tree)
         settings = scene.umbra
-        stars = False
+        stars = find_setup(scene) is None and environment.shows_stars(scene)  # a new group has no exposure yet
         notes: list[str] = []
         if settings.environment_source == "WORLD":
             try:

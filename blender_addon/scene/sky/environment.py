@@ -230,11 +230,16 @@ def _value_at(copy: bpy.types.World, world: bpy.types.World, place: Place | None
         return otherwise
 
 
-def world_left_out(scene: bpy.types.Scene) -> str | None:
-    """Return why a World that is more than a color is not the sky, where the stars are shown instead of it."""
+def shows_stars(scene: bpy.types.Scene) -> bool:
+    """Return whether the built-in stars are the scene's sky."""
     settings = scene.umbra
     image = settings.environment_image
-    if settings.environment_source != "IMAGE" or image is None or image.name != STAR_SKY_NAME:
+    return settings.environment_source == "IMAGE" and image is not None and image.name == STAR_SKY_NAME
+
+
+def world_left_out(scene: bpy.types.Scene) -> str | None:
+    """Return why a World that is more than a color is not the sky, where the stars are shown instead of it."""
+    if not shows_stars(scene):
         return None
     try:
         world = _world_of(scene)
