@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import bpy
 
 from ..bake.request import MapRequest
+from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..scene.cameras import PLAIN, Traits
 from ..scene.frame_setup import FrameSetup
@@ -34,6 +35,17 @@ class Notice:
     icon: str = "INFO"
     operator: str = ""
     """The operator that helps, as a button below."""
+
+
+def refusals(scene: bpy.types.Scene, *checks: Callable[[bpy.types.Scene], None]) -> list[Notice]:
+    """Return what checks of a render refuse in a scene, for the panel."""
+    found = []
+    for check in checks:
+        try:
+            check(scene)
+        except SceneError as error:
+            found.append(Notice(error.for_user(), "ERROR"))
+    return found
 
 
 class LiveMap(Protocol):

@@ -321,6 +321,35 @@ def test_a_sky_of_the_artists_own_nodes_stays(
     assert addon_module("outputs.registry").of(scene).sky_problem(scene) is None
 
 
+def panel(addon_module: Callable[[str], ModuleType]) -> str:
+    """What the panel says of the scene."""
+    return " ".join(line.text for line in addon_module("ui.status").lines(bpy.context))
+
+
+def test_a_camera_that_another_scene_bends_is_refused(
+    scene: bpy.types.Scene, tree_module: ModuleType, addon_module: Callable[[str], ModuleType]
+) -> None:
+    add_hole(scene)
+    other = bpy.data.scenes.new("Other")
+    for each in scene.objects:
+        other.collection.objects.link(each)
+    other.camera, other.world, other.render.engine = scene.camera, scene.world, "CYCLES"
+    other.umbra.environment_image, other.umbra.environment_source = scene.umbra.environment_image, "IMAGE"
+    with bpy.context.temp_override(scene=other, view_layer=other.view_layers[0]):
+        assert bpy.ops.umbra.set_output(output="CYCLES_LENS") == {"FINISHED"}
+    refusal = addon_module("core.errors").SceneError
+    for output in ("COMPOSITOR", "WORLD"):
+        assert bpy.ops.umbra.set_output(output=output) == {"FINISHED"}
+        with pytest.raises(refusal, match="a camera of its own"):
+            addon_module("outputs.registry").of(scene).take_away(scene)
+        assert "a camera of its own" in panel(addon_module)
+        shared = scene.camera.data
+        scene.camera.data = bpy.data.cameras.new("Own")
+        addon_module("outputs.registry").of(scene).take_away(scene)
+        assert "a camera of its own" not in panel(addon_module)
+        scene.camera.data = shared
+
+
 def test_strips_that_are_not_rendered_do_not_matter(
     scene: bpy.types.Scene, addon_module: Callable[[str], ModuleType]
 ) -> None:
@@ -331,8 +360,11 @@ def test_strips_that_are_not_rendered_do_not_matter(
     strip = editor.strips.new_effect("Title", "COLOR", 2, 1, **end)
     with pytest.raises(refusal, match='"Title"'):
         check(scene)
+    add_hole(scene)
+    assert 'has the strip "Title"' in panel(addon_module)  # before a render is refused
     strip.mute = True
     check(scene)
+    assert "Title" not in panel(addon_module)
     strip.mute = False
     editor.channels[2].mute = True
     check(scene)

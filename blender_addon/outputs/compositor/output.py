@@ -12,10 +12,11 @@ from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import black_hole_group
 from ...scene import frame_setup, instanced_hole
+from ...scene.camera_type import check_unbent
 from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
 from ...scene.sky import environment, panorama, sky_frames
-from ..protocol import Look, Notice, Output
+from ..protocol import Look, Notice, Output, refusals
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import (
     check_linked,
@@ -221,6 +222,7 @@ class CompositorOutput(Output):
         """Let the group read no map, and refuse a compositor that could not show one."""
         compositor_sync.point_at_nothing(scene)
         sequencer.check(scene)
+        check_unbent(scene)
         check_rendered(scene)
         check_linked(scene)
         check_unmuted(scene)
@@ -290,7 +292,8 @@ class CompositorOutput(Output):
             found.append(MOTION_BLUR)
         if frame.aperture > 0.0:
             found.append(DEPTH_OF_FIELD)
-        return [Notice(each) for each in found if each is not None]
+        refused = refusals(scene, sequencer.check, check_unbent)
+        return refused + [Notice(each) for each in found if each is not None]
 
     def sky_problem(self, scene: bpy.types.Scene) -> str | None:
         """Return why the sky cannot be read, unless it is the artist's own nodes."""

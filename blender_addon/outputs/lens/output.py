@@ -15,7 +15,7 @@ from ...scene.camera_type import is_converted
 from ...scene.frame_setup import FrameSetup
 from ...scene.sky import environment
 from ...settings.hole_properties import CAMERA_ANIMATION
-from ..protocol import FrameCarrier, Look, Notice, Output
+from ..protocol import FrameCarrier, Look, Notice, Output, refusals
 from ..shared import disk_sync, leaving, sequencer, world_files
 from ..shared.compositor_tree import check_unmuted, find_tree
 from ..shared.look import look_of_scene
@@ -207,7 +207,7 @@ class LensOutput(Output):
         """Say what the picture lacks."""
         if scene.render.engine != self.engine:
             return [Notice("The Cycles Lens needs the render engine Cycles.", "ERROR", "umbra.use_cycles")]
-        found = []
+        found = refusals(scene, sequencer.check)
         problem = lens_shader.device_problem(scene)
         if problem is not None:
             found.append(Notice(problem.for_user(), "INFO" if scene.umbra.cpu_fallback else "ERROR"))

@@ -10,11 +10,12 @@ from ...bake.request import MapRequest, request
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ...nodes import world_group
+from ...scene.camera_type import check_unbent
 from ...scene.cameras import Traits
 from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
 from ...scene.sky import environment
-from ..protocol import Look, Notice, Output
+from ..protocol import Look, Notice, Output, refusals
 from ..shared import sequencer, world_files
 from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group
 from . import lensed_world, panel, world_sync
@@ -99,6 +100,7 @@ class WorldOutput(Output):
         """Let the World read no map, and refuse one that is not the lensed one any more."""
         world_sync.point_at_nothing(scene)
         sequencer.check(scene)
+        check_unbent(scene)
         check_world(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
@@ -138,11 +140,7 @@ class WorldOutput(Output):
 
     def notices(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[Notice]:
         """Say what hides the World."""
-        found = []
-        try:
-            check_world(scene)
-        except SceneError as error:
-            found.append(Notice(error.for_user(), "ERROR"))
+        found = refusals(scene, sequencer.check, check_unbent, check_world)
         found += [Notice(each) for each in lensed_world.unbent(scene)]
         if frame.motion is not Motion.NONE:
             found.append(Notice(MOTION_BLUR))
