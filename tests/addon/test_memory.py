@@ -70,7 +70,8 @@ def test_memory_stays_flat(tmp_path: Path, work: str, size: tuple[int, int], dis
     script = SCRIPT.format(folder=str(tmp_path), frames=FRAMES, size=size, disk=disk) + work
     result = run_python(script, timeout=3600)
     assert result.returncode == 0, result.stderr
-    noted = json.loads(result.stdout.splitlines()[-1])
+    # Blender 4.5 as a module may say at its end that some bytes were not freed
+    noted = json.loads(next(line for line in reversed(result.stdout.splitlines()) if line.startswith("[[")))
     assert len(noted) == FRAMES
     memory, images, datablocks = zip(*noted, strict=True)
     at_a_tenth, at_the_end = memory[FRAMES // 10], memory[-1]
