@@ -85,7 +85,7 @@ def read_footprint(path: PathLike) -> NDArray[np.float16]:
         If the file is missing, damaged, cut short, or has no footprints; the message names it and says which.
     """
     planes, _metadata = FORMAT.read(path)
-    pixels = np.stack(planes, axis=-1).astype(np.float16)
+    pixels: NDArray[np.float16] = np.stack(planes, axis=-1).astype(np.float16)
     if not np.isfinite(pixels).all() or np.abs(pixels[..., :3]).max(initial=0.0) > LONGEST_AXIS:
         raise WarpMapError(advice(f"{path} is damaged: it holds values that no footprint has."), code="map.damaged")
     return pixels
