@@ -38,8 +38,8 @@ def problem(image: bpy.types.Image) -> str | None:
     return None if reason is None else f'The sky image "{image.name}" is not filtered, because {reason}.'
 
 
-def path_of(scene: bpy.types.Scene, image: bpy.types.Image) -> str:
-    """Return where the levels of an image lie, as Blender keeps a path; of a sequence, those of its first file.
+def path_of(scene: bpy.types.Scene, image: bpy.types.Image, source: Path | None = None) -> str:
+    """Return where the levels of an image lie, as Blender keeps a path.
 
     Parameters
     ----------
@@ -47,10 +47,12 @@ def path_of(scene: bpy.types.Scene, image: bpy.types.Image) -> str:
         Whose maps lie there.
     image : Image
         Without a `problem`.
+    source : Path, optional
+        Which file of a sequence; by default the one that the image names.
     """
     name = f"umbra_sky_{_digest(image)}"
     if image.source == "SEQUENCE":
-        name += f"_{sky_frames.path_of(image).stem[-sky_frames.digits_of(image) :]}"
+        name += f"_{(source or sky_frames.path_of(image)).stem[-sky_frames.digits_of(image) :]}"
     return folder(scene).blender_path + name + ".exr"
 
 
@@ -75,12 +77,9 @@ def ensure(scene: bpy.types.Scene, image: bpy.types.Image, *, may_bake: bool, se
     physics.BlackHoleError
         They cannot be written.
     """
-    path = Path(bpy.path.abspath(path_of(scene, image)))
-    source = None
-    if image.source == "SEQUENCE":
-        source = sky_frames.file_at(image, scene.frame_current, settings)
-        stem = path.stem[: -sky_frames.digits_of(image)]
-        path = path.with_name(f"{stem}{source.stem[-sky_frames.digits_of(image) :]}.exr")
+    is_sequence = image.source == "SEQUENCE"
+    source = sky_frames.file_at(image, scene.frame_current, settings) if is_sequence else None
+    path = Path(bpy.path.abspath(path_of(scene, image, source)))
     if _is_up_to_date(path, source):
         return
     if not may_bake:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Color spaces by what they are for. Their names are the color configuration's, and studios have their own."""
 
+from functools import cache
+
 import bpy
 import numpy as np
 from mathutils import Color
@@ -38,8 +40,7 @@ def mark_as_linear_rec709(image: bpy.types.Image) -> bool:
 
 def is_linear_rec709(image: bpy.types.Image) -> bool:
     """Return whether an image's numbers are linear Rec.709."""
-    name = image.colorspace_settings.name
-    return name == _LINEAR_REC709 or _is_linear_rec709(name)
+    return _is_linear_rec709(image.colorspace_settings.name)
 
 
 def _is_linear_rec709(name: str) -> bool:
@@ -49,9 +50,15 @@ def _is_linear_rec709(name: str) -> bool:
 
 def is_srgb(image: bpy.types.Image) -> bool:
     """Return whether an image is encoded as pictures on screens are: in the configuration's space for 8-bit images."""
+    return bool(image.colorspace_settings.name == _space_of_8_bits())
+
+
+@cache
+def _space_of_8_bits() -> str:
+    """The space that the configuration, one for the process, gives to new images of 8 bits."""
     probe = bpy.data.images.new("Umbra Probe", 1, 1)
     try:
-        return bool(image.colorspace_settings.name == probe.colorspace_settings.name)
+        return str(probe.colorspace_settings.name)
     finally:
         bpy.data.images.remove(probe)
 

@@ -227,11 +227,14 @@ def is_current(tree: bpy.types.NodeTree) -> bool:
     return kind is not None and kind.is_current(tree) and whole
 
 
-def ensure_group(looks: int = 0) -> bpy.types.NodeTree:
-    """Return the group for a number of looks, and build it and the group inside it if they are not current."""
+def ensure_group(looks: int = 0, tree: bpy.types.NodeTree | None = None) -> bpy.types.NodeTree:
+    """Return the group for a number of looks, and build it and the group inside it if they are not current.
+
+    A group that is given becomes it; by default it is this file's.
+    """
     if looks:
         filtered_sky.LOOK.ensure()
-    return group_of(looks).ensure()
+    return group_of(looks).ensure(tree)
 
 
 def find_group(looks: int = 0) -> bpy.types.NodeTree | None:
@@ -258,11 +261,9 @@ def use(node: bpy.types.Node, looks: int) -> None:
     former = node.node_tree
     kind = kind_of(former)
     if former is not None and kind is not None and former.library is None:
-        if looks:
-            filtered_sky.LOOK.ensure()
         present = group_of(looks).find()
         if former.users == 1 and present in (None, former):
-            group_of(looks).ensure(former)  # in place: nobody else uses it
+            ensure_group(looks, former)  # in place: nobody else uses it
             remove_unused()
             return
         kind.ensure(former)  # now its inputs are those of the other group

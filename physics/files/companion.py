@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +13,31 @@ from ..images.exr import PathLike
 from ..maps.warp_map import WarpMap
 from ..shot.map_parameters import WarpMapParameters
 from .map_file import MapFormat
+
+# The number of the frame at the end of a map's name.
+_FRAME = re.compile(r"_\d+$")
+
+
+def path_beside(map_path: PathLike, mark: str) -> str:
+    """Return where a file beside a map lies: like the map, with a mark before the number of the frame.
+
+    Parameters
+    ----------
+    map_path : path
+        The map's; also one that only Blender understands, such as ``//maps/Scene_0001.exr``.
+    mark : str
+        What tells the file from the map.
+
+    Returns
+    -------
+    str
+        ``Scene_<mark>_0001.exr`` for ``Scene_0001.exr``, so that the files of an animation are an image sequence too;
+        ``picture_<mark>.exr`` for ``picture.exr``, which has no frame number.
+    """
+    stem, ending = os.path.splitext(os.fspath(map_path))
+    frame = _FRAME.search(stem)
+    end = len(stem) if frame is None else frame.start()
+    return f"{stem[:end]}_{mark}{stem[end:]}{ending}"
 
 
 @dataclass(frozen=True)

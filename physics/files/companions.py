@@ -24,6 +24,10 @@ COMPANION_MARKS = "|".join(each.mark for each in COMPANIONS)
 """Regular expression of what stands before the frame's number in the names of such files."""
 
 
+def _kinds(optional: bool) -> list[Companion]:
+    return [each for each in COMPANIONS if optional or not each.is_optional]
+
+
 def files_beside(
     map_path: PathLike, parameters: WarpMapParameters, *, optional: bool = True
 ) -> tuple[tuple[Path, MapFormat], ...]:
@@ -38,8 +42,7 @@ def files_beside(
     optional : bool
         Whether those count that can be made from the map at any time.
     """
-    kinds = [each for each in COMPANIONS if optional or not each.is_optional]
-    return tuple((path, each.format) for each in kinds for path in each.paths(map_path, parameters))
+    return tuple((path, each.format) for each in _kinds(optional) for path in each.paths(map_path, parameters))
 
 
 def write_companions(
@@ -64,9 +67,7 @@ def write_companions(
         If a file cannot be written.
     """
     parameters = WarpMapParameters.from_metadata(warp_map.metadata["parameters"])
-    for each in COMPANIONS:
-        if each.is_optional and not optional:
-            continue
+    for each in _kinds(optional):
         for number, path in enumerate(each.paths(map_path, parameters)):
             each.write(place(path), warp_map, number)
 

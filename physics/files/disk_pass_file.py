@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from ..images.exr import PathLike
 from ..maps.warp_map import WarpMap
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..shot.map_parameters import WarpMapParameters
-from .companion import Companion
+from .companion import Companion, path_beside
 from .map_file import MapFormat, advice
 
 FORMAT = MapFormat(
@@ -26,10 +25,6 @@ FORMAT = MapFormat(
     "R: radius on the disk (M); G: azimuth in the hole's frame (radians); B: g; A: coverage",
     attributes=("umbraCrossing",),
 )
-
-
-# The number of the frame at the end of a map's name.
-_FRAME = re.compile(r"_\d+$")
 
 
 def pass_path(map_path: PathLike, crossing: int) -> str:
@@ -48,10 +43,7 @@ def pass_path(map_path: PathLike, crossing: int) -> str:
         ``Scene_disk1_0001.exr`` for ``Scene_0001.exr``, so that the passes of an animation are an image sequence too;
         ``picture_disk1.exr`` for ``picture.exr``, which has no frame number.
     """
-    stem, ending = os.path.splitext(os.fspath(map_path))
-    frame = _FRAME.search(stem)
-    end = len(stem) if frame is None else frame.start()
-    return f"{stem[:end]}_disk{crossing}{stem[end:]}{ending}"
+    return path_beside(map_path, f"disk{crossing}")
 
 
 def find_pass(map_path: PathLike, crossing: int) -> Path:

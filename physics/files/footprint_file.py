@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,7 @@ from ..maps.footprint import LONGEST_AXIS, footprint
 from ..maps.warp_map import WarpMap
 from ..numerics.errors import WarpMapError
 from ..shot.map_parameters import WarpMapParameters
-from .companion import Companion
+from .companion import Companion, path_beside
 from .map_file import MapFormat, advice
 
 FORMAT = MapFormat(
@@ -24,9 +22,6 @@ FORMAT = MapFormat(
     "a footprint",
     "R, G, B: major axis of the part of the sky that a pixel sees, in world axes (radians); A: log2 of the minor axis",
 )
-
-# The number of the frame at the end of a map's name.
-_FRAME = re.compile(r"_\d+$")
 
 
 def footprint_path(map_path: PathLike) -> str:
@@ -42,10 +37,7 @@ def footprint_path(map_path: PathLike) -> str:
     str
         ``Scene_footprint_0001.exr`` for ``Scene_0001.exr``; ``picture_footprint.exr`` for ``picture.exr``.
     """
-    stem, ending = os.path.splitext(os.fspath(map_path))
-    frame = _FRAME.search(stem)
-    end = len(stem) if frame is None else frame.start()
-    return f"{stem[:end]}_footprint{stem[end:]}{ending}"
+    return path_beside(map_path, "footprint")
 
 
 def write_footprint(path: PathLike, warp_map: WarpMap) -> None:
