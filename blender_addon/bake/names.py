@@ -42,8 +42,8 @@ _HASH_CHARACTERS = 12
 # 255 bytes that file systems allow.
 _READABLE_BYTES = 120
 
-# Stands for the .blend file while there is none: another one in each process.
-_unsaved = SESSION.value(lambda: secrets.token_hex(8), Life.REGISTRATION)
+# Stands for the .blend file while there is none: another one for each new file.
+_unsaved = SESSION.value(lambda: secrets.token_hex(8), Life.FILE)
 
 
 def shot_name(scene: bpy.types.Scene, hole_name: str) -> str:

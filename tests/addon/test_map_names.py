@@ -10,7 +10,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from small_scene import add_hole, compositor, plain_name, read, render, run_python
+from small_scene import add_hole, compositor, plain_name, read, render, run_python, shrink
 
 RENDER_WITHOUT_ADDON = """
 import os
@@ -195,6 +195,20 @@ os._exit(0)
     assert len(stamps[2]) == 3
     assert len(set(stamps[2].values())) == 2
     assert {plain_name(each) for each in stamps[2]} == {"Scene_Black_Hole_64x36_0001.exr"}
+
+
+def test_a_new_file_has_no_maps_of_the_unsaved_one_before(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    """File > New in one process: what the first file has baked does not go where the second is saved."""
+    for frame in (1, 2):
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        scene = bpy.context.scene
+        shrink(scene)
+        add_hole(scene)
+        scene.umbra.map_folder = "//maps/"
+        scene.frame_set(frame)
+        assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
+    save(tmp_path / "second.blend")
+    assert [plain_name(each) for each in maps(tmp_path / "maps")] == ["Scene_Black_Hole_64x36_0002.exr"]
 
 
 def test_maps_of_version_0_1_0_are_adopted(
