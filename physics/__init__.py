@@ -52,7 +52,12 @@ from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_
 from .kerr.observer import Observer, local_velocity
 from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
 from .kerr.shadow_outline import shadow_outline
-from .light.color import CHANNEL_WAVELENGTHS, SECOND_RADIATION_CONSTANT, redshift_gain
+from .light.black_body import SECOND_RADIATION_CONSTANT
+from .light.black_body import color as black_body_color
+from .light.black_body import luminance as black_body_luminance
+from .light.black_body import rgb as black_body_rgb
+from .light.black_body import temperature_from_rgb as black_body_temperature
+from .light.color import CHANNEL_WAVELENGTHS, redshift_gain
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
 from .light.disk_flux import PROFILES as DISK_PROFILES
 from .light.disk_flux import page_thorne_flux
@@ -214,6 +219,10 @@ __all__ = [
     "bake_exit_map_steps",
     "bake_steps",
     "bake_world_map_steps",
+    "black_body_color",
+    "black_body_luminance",
+    "black_body_rgb",
+    "black_body_temperature",
     "check_accuracy",
     "check_map",
     "disk_color",

@@ -38,9 +38,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..numerics.checks import number
 from ..numerics.errors import BlackHoleError
-
-SECOND_RADIATION_CONSTANT = 0.014387768775
-"""h c / k_B in meter kelvin (CODATA 2018; exact by the SI's definitions, rounded to the digits written)."""
+from .black_body import SECOND_RADIATION_CONSTANT
 
 CHANNEL_WAVELENGTHS = (611.4e-9, 549.1e-9, 464.3e-9)
 """Dominant wavelengths of the Rec. 709 red, green and blue primaries against D65 white (meters)."""

@@ -12,11 +12,11 @@ import numpy as np
 
 from ..numerics.arrays import Array
 from ..shot.disk import Disk
+from . import black_body
 from .color import redshift_gain
 from .disk_flux import relative_flux
 from .disk_settings import COLDEST, HOTTEST, DiskLook
 from .disk_texture import PICTURE_CHANNELS, moving_texture
-from .star_color import black_body_color
 
 # Light that is redshifted further is not seen; alphas below this one have no color.
 SMALLEST_G, SMALLEST_ALPHA = 1e-6, 1e-6
@@ -24,7 +24,7 @@ SMALLEST_G, SMALLEST_ALPHA = 1e-6, 1e-6
 # How many colors are tabulated, evenly in the logarithm of the temperature.
 COLORS = 512
 _TABLE = np.linspace(np.log(COLDEST), np.log(HOTTEST), COLORS)
-_COLORS = black_body_color(np.exp(_TABLE))
+_COLORS = black_body.color(np.exp(_TABLE))
 
 
 def seen_color(temperature: Array) -> Array:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
+from . import black_body
 from .milky_way import COLOR_INDEX, unresolved_glow
-from .star_color import black_body_color, temperature_from_color_index
+from .star_color import temperature_from_color_index
 
 CATALOG = Path(__file__).parent / "data" / "stars_xhip.npz"
 FAINTEST = 8.0
@@ -139,7 +140,7 @@ def draw_stars(stars: Stars, height: int, star_width: float = 0.6) -> Array:
     texel = math.pi / height
     sigma = star_width * texel
     solid_angles = row_solid_angles(height)
-    colors = black_body_color(temperature_from_color_index(stars.color_index)) * stars.flux[:, np.newaxis]
+    colors = black_body.color(temperature_from_color_index(stars.color_index)) * stars.flux[:, np.newaxis]
     # Continuous position in the panorama, texel centers at i + 0.5.
     row = (0.5 - stars.declination / math.pi) * height
     column = (0.5 - stars.right_ascension / (2.0 * math.pi)) * width
@@ -237,7 +238,7 @@ def star_sky(
     picture = draw_stars(stars, height, star_width)
     if galactic_glow:
         glow = unresolved_glow(float(np.sum(stars.flux)))
-        tint = black_body_color(temperature_from_color_index(COLOR_INDEX))
+        tint = black_body.color(temperature_from_color_index(COLOR_INDEX))
         for start in range(0, height, _ROWS_AT_ONCE):
             rows = np.arange(start, min(start + _ROWS_AT_ONCE, height))
             picture[rows] += glow(texel_directions(rows, height))[..., np.newaxis] * tint

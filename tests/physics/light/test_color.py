@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from physics.light.color import CHANNEL_WAVELENGTHS, DEFAULT_TEMPERATURE, SECOND_RADIATION_CONSTANT, redshift_gain
+from physics.light.black_body import SECOND_RADIATION_CONSTANT
+from physics.light.color import CHANNEL_WAVELENGTHS, DEFAULT_TEMPERATURE, redshift_gain
 
 PLANCK = 6.62607015e-34  # J s
 LIGHT_SPEED = 299792458.0  # m / s

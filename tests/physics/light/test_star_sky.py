@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from physics import BlackHoleError
+from physics.light.black_body import LUMINANCE_WEIGHTS
+from physics.light.black_body import color as black_body_color
 from physics.light.milky_way import galactic_axes, unresolved_glow
-from physics.light.star_color import LUMINANCE_WEIGHTS, black_body_color, temperature_from_color_index
+from physics.light.star_color import temperature_from_color_index
 from physics.light.star_sky import (
     ZERO_MAGNITUDE,
     Stars,
