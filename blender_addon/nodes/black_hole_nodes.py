@@ -103,12 +103,12 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
     with builder.frame("Warp map: is it one?"):
         channels = _read_map(inputs.warp_map)
     with builder.frame("Direction in the environment"):
-        u, v = _texture_coordinates(channels, inputs.rotation)
+        direction = _direction(channels)
+        u, v = _texture_coordinates(channels, direction, inputs.rotation)
     with builder.frame("Environment"):
         environment = sample_bilinearly(inputs.environment, u, v)
     if looks:
         with builder.frame("Filtered sky"):
-            direction = _direction(channels).rotated(inputs.rotation)
             environment = filtered(environment, inputs.levels, inputs.footprint, direction, inputs.rotation, looks)
     with builder.frame("Redshift"):
         gain = redshift_gain(channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
@@ -156,7 +156,7 @@ def _direction(channels: _MapChannels) -> Vector:
     return combine(sine * cos(channels.phi), sine * sin(channels.phi), cos(channels.theta))
 
 
-def _texture_coordinates(channels: _MapChannels, rotation: Vector) -> tuple[Float, Float]:
+def _texture_coordinates(channels: _MapChannels, direction: Vector, rotation: Vector) -> tuple[Float, Float]:
     """Texture coordinates of the rotated direction: u within -0.6..0.6 (it repeats), v in 0..1 from below.
 
     The rotation is R = Rz Ry Rx. Rz only adds to the longitude; Ry Rx needs the vector, whose float32
@@ -165,7 +165,7 @@ def _texture_coordinates(channels: _MapChannels, rotation: Vector) -> tuple[Floa
     angle_x, angle_y, angle_z = rotation.separate()
     tilted = (abs(angle_x) + abs(angle_y)).greater_than(0.0).labeled("Tilted?")
 
-    x, y, z = _direction(channels).rotated(combine(angle_x, angle_y, 0.0)).separate()
+    x, y, z = direction.turned(rotation.builder.rotation_rows(combine(angle_x, angle_y, 0.0)))
     tilted_longitude = atan2(y, x)
     # By arc tangent, since the arc sine of z loses half of the digits at the poles.
     tilted_polar = atan2(sqrt(multiply_add(x, x, y * y)), z)

@@ -37,7 +37,7 @@ def filtered(
     footprint : Vector
         Image of the map's size: major axis, and log2 of the minor axis as alpha.
     direction : Vector
-        Unit vector of the sky's frame.
+        Unit vector of the map's frame.
     rotation : Vector
         Euler angles that turn the map's frame into the sky's.
     looks : int
@@ -49,8 +49,9 @@ def filtered(
         Colors of the map's size.
     """
     x, y, z, log_minor = separate_color(footprint)
-    major = combine(x, y, z).rotated(rotation)
+    major = combine(x, y, z)
     length = major.length().labeled("Major axis")
+    turn = plain.builder.rotation_rows(rotation)
     width, height = image_size(atlas)
     is_there = height.greater_than(8.0 * _MARGIN).labeled("Levels there?")
     rows = maximum((height - 4.0 * _MARGIN) * (2.0 / 3.0), float(physics.FEWEST_SKY_ROWS)).labeled("Rows of level 0")
@@ -63,11 +64,12 @@ def filtered(
     ratio = texel / (part * maximum(length, 1e-9))
     major = major * sqrt(maximum(0.0, 1.0 - ratio * ratio))
     width, height = maximum(width, 1.0), maximum(height, 1.0)
-    scale, offset = _place_of_level(level, part, rows, width, height)
+    place = _place_of_level(level, part, rows, width, height)
 
     light: Operand = (0.0, 0.0, 0.0)
-    shared = {_ATLAS: atlas, _SIZE: combine(width, height, 0.0), _DIRECTION: direction, _MAJOR: major}
-    shared |= {_SCALE: scale, _OFFSET: offset}
+    shared = {_ATLAS: atlas, _SIZE: combine(width, height, 0.0)}
+    shared |= {_DIRECTION: combine(*direction.turned(turn)), _MAJOR: combine(*major.turned(turn))}
+    shared |= dict(zip(_PLACE, place, strict=True))
     look_group = LOOK.ensure()
     for look in range(looks):
         node = plain.builder.node(GROUP_NODE_TYPE)
@@ -83,21 +85,28 @@ def _log2(value: Float) -> Float:
     return value.builder.math("LOGARITHM", value, 2.0)
 
 
-def _place_of_level(level: Float, part: Float, rows: Float, width: Float, height: Float) -> tuple[Vector, Vector]:
-    """Where a level lies in the atlas: what coordinates 0 to 1 are multiplied by, and what is added to them."""
+def _place_of_level(level: Float, part: Float, rows: Float, width: Float, height: Float) -> tuple[Float, ...]:
+    """Where a level lies in the atlas: what longitude and polar angle are multiplied by, and what is added to them."""
     columns = rows * 2.0
     above = minimum(level, 1.0)
     # Level l begins after the l - 1 levels beside it: columns (1 - 2^(1 - l)) and their margins.
     before = multiply_add(part, columns * -2.0, columns) + multiply_add(level, 2.0 * _MARGIN, -2.0 * _MARGIN)
-    scale = combine(columns * part / width, rows * part / height, 1.0)
+    wide, high = part * (columns / width), part * (rows / height)
     left = multiply_add(above, before, _MARGIN) / width
-    return scale, combine(left, multiply_add(above, rows + 2.0 * _MARGIN, _MARGIN) / height, 0.0)
+    below = multiply_add(above, rows + 2.0 * _MARGIN, _MARGIN) / height
+    return (
+        wide * (-0.5 / math.pi),
+        multiply_add(wide, 0.5, left),
+        high * (-1.0 / math.pi),
+        high + below,
+    )
 
 
 # --- one look, a group of its own: large trees take long to build ----------------------------------
 
 _ATLAS, _SIZE, _DIRECTION, _MAJOR = "Atlas", "Size", "Direction", "Major Axis"
-_SCALE, _OFFSET, _SHARE, _LIGHT = "Scale", "Offset", "Share", "Light"
+_SHARE, _LIGHT = "Share", "Light"
+_PLACE = "Width", "Left", "Height", "Top"
 
 
 def _vector(name: str, description: str) -> SocketSpec:
@@ -107,17 +116,16 @@ def _vector(name: str, description: str) -> SocketSpec:
 def _build_look(builder: TreeBuilder, values: Values) -> Values:
     share = values[_SHARE]
     x, y, z = multiply_add(values[_MAJOR], combine(share, share, share), values[_DIRECTION]).separate()
-    u = multiply_add(atan2(y, x), -0.5 / math.pi, 0.5)
-    v = multiply_add(atan2(sqrt(multiply_add(x, x, y * y)), z), -1.0 / math.pi, 1.0)
-    uv = multiply_add(combine(u, v, 1.0), values[_SCALE], values[_OFFSET])
-    return {_LIGHT: values[_LIGHT] + _sample(values[_ATLAS], uv, values[_SIZE])}
+    wide, left, high, top = (values[name] for name in _PLACE)
+    u = multiply_add(atan2(y, x), wide, left)
+    v = multiply_add(atan2(sqrt(multiply_add(x, x, y * y)), z), high, top)
+    return {_LIGHT: values[_LIGHT] + _sample(values[_ATLAS], u, v, values[_SIZE])}
 
 
-def _sample(atlas: Vector, uv: Vector, size: Vector) -> Vector:
+def _sample(atlas: Vector, u: Float, v: Float, size: Vector) -> Vector:
     """Bilinear look-up inside a level, whose margin makes wrapping needless."""
     if COMPOSITOR_SETTINGS_ARE_SOCKETS:
-        return map_uv(atlas, uv, "Bilinear")
-    u, v, _ = uv.separate()
+        return map_uv(atlas, combine(u, v, 1.0), "Bilinear")
     width, height, _ = size.separate()
     column, row = multiply_add(u, width, -0.5), multiply_add(v, height, -0.5)
     left, below = floor(column), floor(row)
@@ -139,8 +147,7 @@ LOOK = VersionedGroup(
         _vector(_SIZE, "Width and height of the atlas, pixels"),
         _vector(_DIRECTION, "Where the pixel looks"),
         _vector(_MAJOR, "Major axis of what it sees, without the width of a texel"),
-        _vector(_SCALE, "What coordinates of a level are multiplied by in the atlas"),
-        _vector(_OFFSET, "What is added to them"),
+        *(SocketSpec(name, "NodeSocketFloat", f"{name} of the level in the atlas", default=0.0) for name in _PLACE),
         SocketSpec(_SHARE, "NodeSocketFloat", "Where along the axis: -0.5 to 0.5", default=0.0),
         _vector(_LIGHT, "Light of the looks so far"),
     ),

@@ -41,7 +41,7 @@ def install(module: Callable[[str], ModuleType]) -> None:
         is_new = not tree.nodes
         rebuild(group, tree)
         path = _path(group)
-        if is_new and path is not None and not path.exists():
+        if is_new and path is not None and tree.name == group.name and not path.exists():
             unfinished = path.with_suffix(f".{os.getpid()}")
             bpy.data.libraries.write(str(unfinished), {tree})
             unfinished.replace(path)
