@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 
 import bpy
@@ -22,6 +23,9 @@ VERSION = 1
 
 _DIGITS = 16
 
+# Of a movie, by whose beginning and end it is known.
+_END = 2**20
+
 # Images as they were -> the digest of their content.
 _digests = SESSION.value(dict[tuple[object, ...], str], Life.FILE)
 
@@ -29,16 +33,14 @@ _digests = SESSION.value(dict[tuple[object, ...], str], Life.FILE)
 def problem(image: bpy.types.Image) -> str | None:
     """Return why an image has no levels, as a sentence, if so."""
     reason = None
-    if image.source == "MOVIE":
-        reason = "it is a movie: render it as an image sequence"
-    elif image.type == "MULTILAYER":
+    if image.type == "MULTILAYER":
         reason = "it has layers: save it as an image of one layer"
     elif not image.is_float and not (_is_plain(image) or color_spaces.is_srgb(image)):
         reason = f"its 8-bit colors are in {image.colorspace_settings.name}: convert it to a linear OpenEXR file"
     return None if reason is None else f'The sky image "{image.name}" is not filtered, because {reason}.'
 
 
-def path_of(scene: bpy.types.Scene, image: bpy.types.Image, source: Path | None = None) -> str:
+def path_of(scene: bpy.types.Scene, image: bpy.types.Image, number: str = "0001") -> str:
     """Return where the levels of an image lie, as Blender keeps a path.
 
     Parameters
@@ -47,17 +49,17 @@ def path_of(scene: bpy.types.Scene, image: bpy.types.Image, source: Path | None 
         Whose maps lie there.
     image : Image
         Without a `problem`.
-    source : Path, optional
-        Which file of a sequence; by default the one that the image names.
+    number : str
+        Of an image that moves: which of its frames, in at least as many digits as the levels of all of them have.
     """
     name = f"umbra_sky_{_digest(image)}"
-    if image.source == "SEQUENCE":
-        name += f"_{(source or sky_frames.path_of(image)).stem[-sky_frames.digits_of(image) :]}"
+    if sky_frames.moves(image):
+        name += f"_{number}"
     return folder(scene).blender_path + name + ".exr"
 
 
 def ensure(scene: bpy.types.Scene, image: bpy.types.Image, *, may_bake: bool, settings: object = None) -> None:
-    """Make the levels of an image, or of the file that it shows at the scene's frame, unless they are there.
+    """Make the levels of an image, or of what it shows at the scene's frame, unless they are there.
 
     Parameters
     ----------
@@ -68,7 +70,7 @@ def ensure(scene: bpy.types.Scene, image: bpy.types.Image, *, may_bake: bool, se
     may_bake : bool
         Whether they may be made.
     settings : image node, optional
-        Which files of a sequence are shown.
+        Which frames of a sequence or movie are shown.
 
     Raises
     ------
@@ -77,9 +79,9 @@ def ensure(scene: bpy.types.Scene, image: bpy.types.Image, *, may_bake: bool, se
     physics.BlackHoleError
         They cannot be written.
     """
-    is_sequence = image.source == "SEQUENCE"
-    source = sky_frames.file_at(image, scene.frame_current, settings) if is_sequence else None
-    path = Path(bpy.path.abspath(path_of(scene, image, source)))
+    number = sky_frames.number_at(scene.frame_current, settings) if sky_frames.moves(image) else 0
+    source = sky_frames.file_at(image, scene.frame_current, settings) if image.source == "SEQUENCE" else None
+    path = Path(bpy.path.abspath(path_of(scene, image, f"{number:04d}")))
     if _is_up_to_date(path, source):
         return
     if not may_bake:
@@ -88,7 +90,12 @@ def ensure(scene: bpy.types.Scene, image: bpy.types.Image, *, may_bake: bool, se
             "choose Filter: Off in the Umbra panel.",
             code="sky.levels-missing",
         )
-    pixels = _pixels(image) if source is None else _pixels_of_file(source, image)
+    if source is not None:
+        pixels = _pixels_of_file(source, image)
+    elif image.source == "MOVIE":
+        pixels = _pixels_of_movie(image, number)
+    else:
+        pixels = _pixels(image)
     atlas = physics.sky_levels(pixels).atlas()
     is_half = float(np.abs(atlas).max()) <= physics.LARGEST_HALF
     attributes = {"umbraSky": _stamp(source)}
@@ -148,11 +155,26 @@ def _digest(image: bpy.types.Image) -> str:
 def _content(image: bpy.types.Image, path: Path) -> bytes:
     if image.source == "SEQUENCE":
         return path.name.encode()
+    if image.source == "MOVIE":
+        return _ends_of(path)
     if image.packed_file is not None and not image.is_dirty:
         return bytes(image.packed_file.data)
     if image.source == "FILE" and path.is_file() and not image.is_dirty:
         return path.read_bytes()
     return _values(image).tobytes()
+
+
+def _ends_of(path: Path) -> bytes:
+    """Length, beginning and end of a file that may be very large."""
+    try:
+        with path.open("rb") as file:
+            length = file.seek(0, os.SEEK_END)
+            file.seek(max(length - _END, 0))
+            end = file.read()
+            file.seek(0)
+            return f"{length} ".encode() + file.read(_END) + end
+    except OSError:
+        return str(path).encode()
 
 
 def _values(image: bpy.types.Image) -> NDArray[np.float32]:
@@ -185,3 +207,19 @@ def _pixels_of_file(path: Path, image: bpy.types.Image) -> NDArray[np.float32]:
         return _pixels(single)
     finally:
         bpy.data.images.remove(single)
+
+
+def _pixels_of_movie(image: bpy.types.Image, number: int) -> NDArray[np.float32]:
+    """The colors of one frame of a movie, by its number from 1 on.
+
+    An image's pixels are those of the frame that was last asked for; a texture can ask for one, while a render runs too.
+    """
+    texture = bpy.data.textures.new(image.name, "IMAGE")
+    try:
+        texture.image = image
+        texture.image_user.frame_duration = max(image.frame_duration, 1)
+        texture.image_user.frame_current = max(number, 1)
+        texture.evaluate((0.0, 0.0, 0.0))
+        return _pixels(image)
+    finally:
+        bpy.data.textures.remove(texture)

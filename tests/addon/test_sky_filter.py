@@ -30,7 +30,9 @@ def ours(scene: bpy.types.Scene) -> dict[str, bpy.types.Node]:
     return {node["umbra_role"]: node for node in compositor(scene).nodes if "umbra_role" in node}
 
 
-def is_the_references(scene: bpy.types.Scene, picture: np.ndarray, sky: np.ndarray, looks: int) -> bool:
+def is_the_references(
+    scene: bpy.types.Scene, picture: np.ndarray, sky: np.ndarray, looks: int, tolerance: float = TOLERANCE
+) -> bool:
     """Whether a picture is what numpy makes of the scene's one map."""
     folder = Path(scene.umbra.map_folder)
     (path,) = (each for each in folder.glob("*_0001.exr") if "footprint" not in each.name and "sky" not in each.name)
@@ -39,7 +41,46 @@ def is_the_references(scene: bpy.types.Scene, picture: np.ndarray, sky: np.ndarr
         physics.read_warp_map(path), sky, exposure=group.inputs["Exposure"].default_value, looks=looks
     ).sky[..., :3]
     error = np.abs(picture[..., :3] - expected).max(axis=-1) / np.maximum(expected.max(axis=-1), expected.mean())
-    return bool(np.quantile(error, 0.99) < TOLERANCE)
+    return bool(np.quantile(error, 0.99) < tolerance)
+
+
+def blocks(seed: int) -> np.ndarray:
+    """A gray sky, even over 2 x 2 texels, as a movie can keep it."""
+    gray = np.random.default_rng(seed).random((128, 256, 1)).astype(np.float32)
+    return np.repeat(gray.repeat(2, axis=0).repeat(2, axis=1), 3, axis=2)
+
+
+def encoded(linear: np.ndarray) -> np.ndarray:
+    """Linear light as sRGB (IEC 61966-2-1)."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055).astype(np.float32)
+
+
+def write_movie(folder: Path, frames: list[np.ndarray]) -> Path:
+    """Write pictures, as they are encoded for display, as a movie: a scene shows them one after the other."""
+    scene = bpy.data.scenes.new("movie")
+    rows, columns = frames[0].shape[:2]
+    editor = scene.sequence_editor_create()
+    for number, frame in enumerate(frames, 1):
+        image = bpy.data.images.new("frame", columns, rows)
+        image.pixels.foreach_set(np.concatenate([frame[::-1], np.ones((rows, columns, 1), np.float32)], 2).ravel())
+        image.file_format = "PNG"
+        image.filepath_raw = str(folder / f"movie_{number}.png")
+        image.save()
+        strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+        strips.new_image(f"{number}", image.filepath_raw, 1, number)
+    scene.frame_start, scene.frame_end = 1, len(frames)
+    settings = scene.render
+    settings.resolution_x, settings.resolution_y, settings.resolution_percentage = columns, rows, 100
+    if hasattr(settings.image_settings, "media_type"):
+        settings.image_settings.media_type = "VIDEO"
+    settings.image_settings.file_format = "FFMPEG"
+    settings.ffmpeg.format, settings.ffmpeg.codec, settings.ffmpeg.constant_rate_factor = "MKV", "H264", "LOSSLESS"
+    scene.view_settings.view_transform = "Standard"
+    settings.filepath = str(folder / "movie.mkv")
+    settings.use_file_extension = False
+    bpy.ops.render.render(animation=True, scene=scene.name)
+    bpy.data.scenes.remove(scene)
+    return folder / "movie.mkv"
 
 
 @pytest.fixture
@@ -83,6 +124,17 @@ def test_a_sequence_is_filtered_frame_by_frame(filtered: bpy.types.Scene, tmp_pa
         picture = render(filtered, tmp_path / "picture.exr", exr)
         # the camera is still: the map of the first frame is that of the second
         assert is_the_references(filtered, picture, noise(number), 8), number
+
+
+def test_a_movie_is_filtered_frame_by_frame(filtered: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> None:
+    path = write_movie(tmp_path, [encoded(blocks(number)) for number in (1, 2, 3)])
+    filtered.umbra.environment_image = bpy.data.images.load(str(path))
+    for number in (1, 3, 2):
+        filtered.frame_set(number)
+        picture = render(filtered, tmp_path / "picture.exr", exr)
+        # 8 bits, and colors that the movie keeps at half resolution
+        assert is_the_references(filtered, picture, blocks(number), 8, tolerance=0.05), number
+        assert not is_the_references(filtered, picture, blocks(number), 0, tolerance=0.05)
 
 
 def test_two_scenes_have_filters_of_their_own(filtered: bpy.types.Scene, tmp_path: Path, exr: ModuleType) -> None:

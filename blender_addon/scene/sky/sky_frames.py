@@ -28,12 +28,6 @@ def moves_at(node: bpy.types.Node) -> bool:
     return node.image is not None and moves(node.image)
 
 
-def digits_of(image: bpy.types.Image) -> int:
-    """Return how many digits end the names of a sequence's files, before what follows the number."""
-    match = _NUMBERED.fullmatch(path_of(image).stem)
-    return 0 if match is None else len(match.group(2)) + len(match.group(3))
-
-
 def path_of(image: bpy.types.Image) -> Path:
     """Return the file that an image names."""
     return Path(bpy.path.abspath(image.filepath, library=image.library))
