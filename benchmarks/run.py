@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures tracing, maps, files, animations and the Cycles Lens, and writes a table and two plots.
+"""Measures tracing, maps, files, animations, the Cycles Lens and the filter of the sky; writes a table and two plots.
 
-The scene of every number but the lens's: spin 0.999, r = 10 on the circular orbit, 60 degrees high, looking at the
+The scene of every number but the lens's and the filter's: spin 0.999, r = 10 on the circular orbit, 60 degrees high, looking at the
 hole.
 """
 
@@ -18,6 +18,7 @@ import disks
 import lens
 import maps
 import plots
+import skies
 import tracing
 
 # Pictures take seconds, so that a disturbance is a small part of them.
@@ -42,6 +43,7 @@ def main() -> None:
     table.add(["", *disks.lines(options.repeats), ""])
     table.add(animations.rows(options.frames, options.orbit_frames))
     table.add(lens.rows(min(options.repeats, LENS_REPEATS)))
+    table.add(["", *skies.lines(min(options.repeats, LENS_REPEATS))])
     table.add(["", *maps.file_lines(options.repeats)])
     table.add(["", f"peak resident memory of the whole run: {measuring.process_memory():.0f} MB"])
     if not options.no_plots:

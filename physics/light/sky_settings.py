@@ -69,7 +69,7 @@ RENDER_ARGUMENTS = {
 SKY_FILTER = Setting(
     "Filter",
     "How the sky is averaged over the part of it that each pixel sees",
-    0,
+    8,
     option="--filter",
     choices=(
         Choice(0, "OFF", 0, "Off", "One look at the sky per pixel: beside the shadow it flickers", 0.0),

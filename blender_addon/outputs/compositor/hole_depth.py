@@ -21,11 +21,11 @@ HOLE_DEPTH = black_hole_group.HOLE_DEPTH.name
 PARTS = "umbra_hole_depths"
 
 # Variables of a driver: a camera's place and third axis, from its matrix, whose first index is the column; the type of
-# its lens (2 is a panorama, whose depth is a distance); and the hole's place.
+# its lens (2 is a panorama, whose depth is a distance); and the hole's place. The matrix of a new camera is 0 at first.
 _CAMERA = {name: f"matrix_world[3][{row}]" for row, name in enumerate("abc")}
 _CAMERA |= {name: f"matrix_world[2][{row}]" for row, name in enumerate("uvw")} | {"t": "data.type"}
 _HOLE: tuple[tuple[str, Literal["LOC_X", "LOC_Y", "LOC_Z"]], ...] = (("x", "LOC_X"), ("y", "LOC_Y"), ("z", "LOC_Z"))
-_DEPTH = "((a-x)*u+(b-y)*v+(c-z)*w)/sqrt(u*u+v*v+w*w) if t<1.5 else sqrt((a-x)*(a-x)+(b-y)*(b-y)+(c-z)*(c-z))"
+_DEPTH = "((a-x)*u+(b-y)*v+(c-z)*w)/sqrt(u*u+v*v+w*w+1e-30) if t<1.5 else sqrt((a-x)*(a-x)+(b-y)*(b-y)+(c-z)*(c-z))"
 
 # A driver's expression has 255 characters at most.
 MOST_SPANS = 4

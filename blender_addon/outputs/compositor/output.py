@@ -174,9 +174,12 @@ class CompositorOutput(Output):
             exposure.default_value = environment.STAR_SKY_EXPOSURE
 
     def on_load(self, scene: bpy.types.Scene) -> None:
-        """Bring a node group of an older version up to date."""
+        """Bring a node group of an older version up to date; a sky that was not filtered stays as it is."""
         setup = find_setup(scene)
         if setup is not None and setup.tree.library is None:
+            is_plain = black_hole_group.kind_of(setup.group.node_tree) == black_hole_group.group_of(0)
+            if is_plain and not scene.umbra.is_property_set("sky_filter"):
+                scene.umbra.sky_filter = "OFF"
             compositor_sync.repair(scene)
             compositor_sync.refresh(scene)
 
