@@ -194,6 +194,7 @@ class Node:
     factor_mode: str
     clamp_factor: bool
     rotation_type: str
+    invert: bool
     mode: str
     filter_type: str
     space: str

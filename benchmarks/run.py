@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures tracing, maps, files, animations, the Cycles Lens and the filter of the sky; writes a table and two plots.
 
-The scene of every number but the lens's and the filter's: spin 0.999, r = 10 on the circular orbit, 60 degrees high, looking at the
-hole.
+The scene of every number but the lens's and the filter's: spin 0.999, r = 10 on the circular orbit, 60 degrees high,
+looking at the hole.
 """
 
 # isort: off

@@ -207,6 +207,7 @@ def build() -> None:
     tilt = (math.radians(-14.0), math.radians(20.0), 0.0)
     tools.black_hole((0.0, 0.0, 0.0), tilt, spin=0.9, mass_scale=DISTANCE / DISTANCE_IN_M, motion="STATIC")
     scene.umbra.environment_source = "WORLD"
+    scene.umbra.hide_behind = False  # the hole stands over the plinth: nothing on it is covered
     bpy.ops.umbra.setup_compositor()
 
     tools.moving_camera(

@@ -212,9 +212,10 @@ def _pixels_of_file(path: Path, image: bpy.types.Image) -> NDArray[np.float32]:
 def _pixels_of_movie(image: bpy.types.Image, number: int) -> NDArray[np.float32]:
     """The colors of one frame of a movie, by its number from 1 on.
 
-    An image's pixels are those of the frame that was last asked for; a texture can ask for one, while a render runs too.
+    An image's pixels are those of the frame that was last asked for. A texture can ask for one, while a render runs too.
     """
     texture = bpy.data.textures.new(image.name, "IMAGE")
+    assert isinstance(texture, bpy.types.ImageTexture)
     try:
         texture.image = image
         texture.image_user.frame_duration = max(image.frame_duration, 1)

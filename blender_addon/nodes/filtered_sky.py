@@ -67,7 +67,7 @@ def filtered(
     place = _place_of_level(level, part, rows, width, height)
 
     light: Operand = (0.0, 0.0, 0.0)
-    shared = {_ATLAS: atlas, _SIZE: combine(width, height, 0.0)}
+    shared: dict[str, Operand] = {_ATLAS: atlas, _SIZE: combine(width, height, 0.0)}
     shared |= {_DIRECTION: combine(*direction.turned(turn)), _MAJOR: combine(*major.turned(turn))}
     shared |= dict(zip(_PLACE, place, strict=True))
     look_group = LOOK.ensure()

@@ -53,13 +53,13 @@ def sync(scene: bpy.types.Scene, setup: Setup, sky: bpy.types.Image) -> None:
     if node.image is None:
         node.image = bpy.data.images.new(LEVELS_IMAGE_NAME, 1, 1, float_buffer=True)
         node.image.filepath = path
-    source = "SEQUENCE" if sky_frames.moves(sky) else "FILE"
-    if node.image.source != source:
-        node.image.source = source
+    moves = sky_frames.moves(sky)
+    if node.image.source != ("SEQUENCE" if moves else "FILE"):
+        node.image.source = "SEQUENCE" if moves else "FILE"
     if node.image.filepath != path:
         node.image.filepath = path
     sky_levels.mark(node.image, sky)
-    if sky_frames.moves(sky):
+    if moves:
         sky_frames.copy_settings(setup.sky, node)
 
 
