@@ -212,14 +212,16 @@ def _pixels_of_file(path: Path, image: bpy.types.Image) -> NDArray[np.float32]:
 def _pixels_of_movie(image: bpy.types.Image, number: int) -> NDArray[np.float32]:
     """The colors of one frame of a movie, by its number from 1 on.
 
-    An image's pixels are those of the frame that was last asked for. A texture can ask for one, while a render runs too.
+    An image's pixels are those of the frame that was asked for last. A texture can ask for one, during a render too.
     """
     texture = bpy.data.textures.new(image.name, "IMAGE")
     assert isinstance(texture, bpy.types.ImageTexture)
+    user = texture.image_user
+    assert user is not None
     try:
         texture.image = image
-        texture.image_user.frame_duration = max(image.frame_duration, 1)
-        texture.image_user.frame_current = max(number, 1)
+        user.frame_duration = max(image.frame_duration, 1)
+        user.frame_current = max(number, 1)
         texture.evaluate((0.0, 0.0, 0.0))
         return _pixels(image)
     finally:
