@@ -105,6 +105,7 @@ def build(scene: object, folder: Path, size: tuple[int, int], rows: int) -> None
     command = f"import physics; physics.write_exr({str(sky)!r}, physics.star_sky({rows}), {{}})"
     subprocess.run([sys.executable, "-c", command], check=True)  # whose memory is not this process's
     scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 1
+    scene.cycles.use_denoising = False
     scene.render.resolution_x, scene.render.resolution_y = size
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR", "32", "NONE"
