@@ -36,6 +36,8 @@ from .files.map_check import Finding as MapFinding
 from .files.map_check import State as MapState
 from .files.map_check import check_map
 from .files.map_file import MapFormat
+from .files.star_file import FORMAT as STARS_FORMAT
+from .files.star_file import read_stars, stars_path, write_stars
 from .files.warp_map_file import FORMAT as WARP_MAP_FORMAT
 from .files.warp_map_file import read_warp_map, read_warp_map_metadata, write_warp_map
 from .files.world_map_file import FORMAT as WORLD_MAP_FORMAT
@@ -91,7 +93,7 @@ from .light.sky_levels import LARGEST_HALF, SkyLevels, sky_levels
 from .light.sky_levels import MARGIN as SKY_LEVEL_MARGIN
 from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
 from .light.sky_settings import SKY_FILTER, SKY_SETTINGS
-from .light.star_sky import star_sky
+from .light.star_sky import Stars, load_stars, star_sky
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
 from .maps.footprint import footprint
 from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
@@ -131,6 +133,8 @@ from .shot.map_parameters import (
     looking_at_hole,
     unstable_orbit_warning,
 )
+from .stars.catalog_file import read_star_catalog
+from .stars.star_layer import StarBaker, StarLayer, StarSettings
 
 __all__ = [
     "ANGLE_SLACK",
@@ -175,6 +179,7 @@ __all__ = [
     "SMALLEST_ALPHA",
     "SMALLEST_G",
     "SMALLEST_ONE_PLUS_Z",
+    "STARS_FORMAT",
     "SUPERSAMPLING",
     "WARP_MAP_FORMAT",
     "WORLD_MAP_FORMAT",
@@ -207,6 +212,10 @@ __all__ = [
     "ReferencePicture",
     "Setting",
     "SkyLevels",
+    "StarBaker",
+    "StarLayer",
+    "StarSettings",
+    "Stars",
     "TraceResult",
     "UnstableOrbitWarning",
     "WarpMap",
@@ -245,6 +254,7 @@ __all__ = [
     "horizon_radius",
     "isco_radius",
     "linear_from_srgb",
+    "load_stars",
     "local_velocity",
     "looking_at_hole",
     "matter_direction",
@@ -261,6 +271,8 @@ __all__ = [
     "read_exr",
     "read_exr_header",
     "read_footprint",
+    "read_star_catalog",
+    "read_stars",
     "read_warp_map",
     "read_warp_map_metadata",
     "read_world_map",
@@ -274,6 +286,7 @@ __all__ = [
     "shadow_outline",
     "sky_levels",
     "star_sky",
+    "stars_path",
     "temporary_target",
     "tinted_disk_light",
     "trace_disk",
@@ -288,6 +301,7 @@ __all__ = [
     "write_footprint",
     "write_map_files",
     "write_png",
+    "write_stars",
     "write_warp_map",
     "write_world_map",
 ]

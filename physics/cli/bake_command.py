@@ -10,7 +10,7 @@ import os
 import time
 from pathlib import Path
 
-from ..files import warp_map_file
+from ..files import star_file, warp_map_file
 from ..files.companions import files_beside, write_companions
 from ..files.warp_map_file import write_warp_map
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
@@ -26,7 +26,7 @@ from ..shot.map_parameters import (
     looking_at_hole,
     unstable_orbit_warning,
 )
-from . import disk_options
+from . import disk_options, star_options
 from .console import note, say
 from .output_files import check_maps
 from .progress import ProgressPrinter
@@ -65,6 +65,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="write the sizes of the pixels on the sky as well, by which Blender's compositor filters it",
     )
     disk_options.add_bake_options(parser)
+    star_options.add_bake_options(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -112,11 +113,14 @@ def run(options: argparse.Namespace) -> None:
     )
     parameters.validate()
     beside = dict(files_beside(options.output, parameters, optional=options.footprint))
+    if options.stars:
+        beside[Path(star_file.stars_path(options.output))] = star_file.FORMAT
     check_maps({options.output: warp_map_file.FORMAT, **beside})
     warning = unstable_orbit_warning(parameters)
     if warning:
         note(f"note: {warning}")
     started = time.perf_counter()
+    stars = star_options.layer_of(options, parameters)
     warp_map = bake(parameters, progress=ProgressPrinter())
     with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
         map_file = together.enter_context(replacing(options.output))
@@ -126,6 +130,8 @@ def run(options: argparse.Namespace) -> None:
             lambda path: together.enter_context(replacing(path)),
             optional=options.footprint,
         )
+        if stars is not None:
+            star_file.write_stars(together.enter_context(replacing(star_file.stars_path(options.output))), stars)
         write_warp_map(map_file, warp_map)
         say("\n".join(_summary(options.output, list(beside), warp_map, time.perf_counter() - started)))
     lost, unresolved = warp_map.counts.get("disk_unresolved", 0), warp_map.counts["unresolved"]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..files.disk_pass_file import find_pass
+from ..files.star_file import stars_path
 from ..files.warp_map_file import read_warp_map, read_warp_map_metadata
 from ..images.exr import replacing, write_exr
 from ..images.picture import read_picture
@@ -19,7 +20,7 @@ from ..light.color import redshift_gain
 from ..light.sky_settings import RENDER_ARGUMENTS, SKY_FILTER, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
 from ..reference.reference_render import render
-from . import disk_options
+from . import disk_options, star_options
 from .console import note, say
 from .output_files import check_picture
 
@@ -53,6 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help=SKY_FILTER.description,
     )
     disk_options.add_render_options(parser)
+    star_options.add_render_options(parser)
 
 
 def sky_arguments(options: argparse.Namespace) -> dict[str, Any]:
@@ -80,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
         disk_options.look_of(options)
     disk = read_warp_map_metadata(options.map)["parameters"].get("disk")
     passes = [find_pass(options.map, crossing) for crossing in range(1, (disk["crossings"] if disk else 0) + 1)]
-    check_picture(options.output, [options.map, options.sky, *passes])
+    check_picture(options.output, [options.map, options.sky, Path(stars_path(options.map)), *passes])
     warp_map = read_warp_map(options.map)
     camera = warp_map.metadata["parameters"]["camera"]
     environment = read_picture(options.sky)
@@ -99,7 +101,8 @@ def run(options: argparse.Namespace) -> None:
         output_size=(camera["width"], camera["height"]),
         looks=next(int(each.value) for each in SKY_FILTER.choices if each.identifier == options.filter.upper()),
     )
-    image = disk_options.draw_disk(options, warp_map, picture.image) if options.disk else picture.image
+    image = star_options.add_stars(options, warp_map, picture.image) if options.stars else picture.image
+    image = disk_options.draw_disk(options, warp_map, image) if options.disk else image
     with replacing(options.output) as temporary:
         if options.output.suffix.lower() == ".png":
             write_png(temporary, image)

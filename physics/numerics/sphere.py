@@ -112,3 +112,27 @@ def spherical_triad(theta: float, phi: float) -> Array:
             [-sin_phi, cos_phi, 0.0],
         ]
     )
+
+
+def euler_rotation(euler: ArrayLike) -> Array:
+    """Return the rotation of XYZ Euler angles.
+
+    Parameters
+    ----------
+    euler : array_like, shape (3,)
+        Angles about x, y and z in radians; applied in this order about fixed axes.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rz Ry Rx.
+    """
+    angle_x, angle_y, angle_z = (float(angle) for angle in np.asarray(euler, dtype=np.float64))
+    cx, sx = math.cos(angle_x), math.sin(angle_x)
+    cy, sy = math.cos(angle_y), math.sin(angle_y)
+    cz, sz = math.cos(angle_z), math.sin(angle_z)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    rotation: Array = about_z @ about_y @ about_x
+    return rotation

@@ -7,7 +7,6 @@ judged against it pixel by pixel, and the command line renders with it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,7 +18,7 @@ from ..light.sky_levels import sky_levels
 from ..maps.footprint import footprint
 from ..numerics.checks import finite, three
 from ..numerics.errors import BlackHoleError
-from ..numerics.sphere import unit_vectors
+from ..numerics.sphere import euler_rotation, unit_vectors
 from .environment_lookup import sample_environment
 from .filtered_sky import sample_filtered
 
@@ -99,15 +98,7 @@ def rotation_matrix(euler: ArrayLike) -> FloatArray:
     ndarray, shape (3, 3)
         R = Rz Ry Rx: the direction to look up is R d.
     """
-    angle_x, angle_y, angle_z = (float(angle) for angle in np.asarray(euler, dtype=np.float64))
-    cx, sx = math.cos(angle_x), math.sin(angle_x)
-    cy, sy = math.cos(angle_y), math.sin(angle_y)
-    cz, sz = math.cos(angle_z), math.sin(angle_z)
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    matrix: FloatArray = about_z @ about_y @ about_x
-    return matrix
+    return euler_rotation(euler)
 
 
 def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:

@@ -187,6 +187,19 @@ class PerspectiveCamera:
         y = 0.5 * self.height - (directions[:, 1] / ahead / per_pixel - self.shift_y * fitted) / tall
         return x, y
 
+    def pixels_around(self, directions: Array) -> tuple[Array, Array]:
+        """Return what `pixels` does: the plane of the picture goes on beyond its border."""
+        return self.pixels(directions)
+
+    def solid_angles(self) -> Array:
+        """Return the solid angle of each pixel, steradians, shape (height, width)."""
+        per_pixel, fitted, tall = self._scale()
+        right = (np.arange(self.width) + 0.5 - 0.5 * self.width + self.shift_x * fitted) * per_pixel
+        up = ((0.5 * self.height - np.arange(self.height) - 0.5) * tall + self.shift_y * fitted) * per_pixel
+        square = (right * right + 1.0) + (up * up)[:, None]
+        angles: Array = (per_pixel * per_pixel * tall) / (square * np.sqrt(square))
+        return angles
+
     def _scale(self) -> tuple[float, float, float]:
         """Return the tangent per pixel width, the fitted side in pixel widths, and a pixel's height in widths."""
         tall = self.pixel_aspect_y / self.pixel_aspect_x
@@ -276,6 +289,26 @@ class PanoramaCamera:
         (level, rise), (ahead, aside) = cos_sin(latitude), cos_sin(longitude)
         along: Array = level * (vector[0] * aside - vector[2] * ahead) + vector[1] * rise
         return along
+
+    def solid_angles(self) -> Array:
+        """Return the solid angle of each pixel, steradians, shape (height, width)."""
+        latitudes = np.linspace(self.latitude_max, self.latitude_min, self.height + 1)
+        bands = np.sin(latitudes[:-1]) - np.sin(latitudes[1:])
+        across = (self.longitude_max - self.longitude_min) / self.width
+        return np.repeat((bands * across)[:, None], self.width, axis=1)
+
+    def pixels_around(self, directions: Array) -> tuple[Array, Array]:
+        """Return the pixel coordinates of directions, shape (n, 3), as if the picture went on beyond its border.
+
+        Columns are counted from half of what is beside the picture on either side.
+        """
+        longitude = np.arctan2(directions[:, 0], -directions[:, 2])
+        latitude = np.arctan2(directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
+        wide = self.longitude_max - self.longitude_min
+        beside = 0.5 * (2.0 * math.pi - wide)
+        x = ((longitude - self.longitude_min + beside) % (2.0 * math.pi) - beside) / wide * self.width
+        y = (self.latitude_max - latitude) / (self.latitude_max - self.latitude_min) * self.height
+        return x, y
 
     def pixels(self, directions: Array) -> tuple[Array, Array]:
         """Return the pixel coordinates where directions, shape (n, 3), are seen, (n,) each; NaN outside the range."""
