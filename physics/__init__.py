@@ -54,13 +54,14 @@ from .kerr.metric import ergosphere_radius, horizon_radius, isco_radius, photon_
 from .kerr.observer import Observer, local_velocity
 from .kerr.orbiting_matter import matter_direction, orbital_frequency, redshift_factor
 from .kerr.shadow_outline import shadow_outline
+from .light import color as color_law
 from .light.black_body import SECOND_RADIATION_CONSTANT
 from .light.black_body import color as black_body_color
 from .light.black_body import luminance as black_body_luminance
 from .light.black_body import rgb as black_body_rgb
 from .light.black_body import temperature_from_rgb as black_body_temperature
-from .light.color import CHANNEL_WAVELENGTHS, redshift_gain
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
+from .light.color import redshift_gain
 from .light.disk_flux import PROFILES as DISK_PROFILES
 from .light.disk_flux import page_thorne_flux
 from .light.disk_flux import peak_flux as peak_disk_flux
@@ -139,7 +140,6 @@ from .stars.star_layer import StarBaker, StarLayer, StarSettings
 __all__ = [
     "ANGLE_SLACK",
     "BOLOMETRIC_EXPONENT",
-    "CHANNEL_WAVELENGTHS",
     "COLDEST_DISK",
     "COMPANION_MARKS",
     "DEFAULT_ACCURACY_SAMPLES",
@@ -234,6 +234,7 @@ __all__ = [
     "black_body_temperature",
     "check_accuracy",
     "check_map",
+    "color_law",
     "disk_color",
     "disk_density",
     "disk_emission",

@@ -111,7 +111,9 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
         with builder.frame("Filtered sky"):
             environment = filtered(environment, inputs.levels, inputs.footprint, direction, inputs.rotation, looks)
     with builder.frame("Redshift"):
-        gain = redshift_gain(channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
+        gain = redshift_gain(
+            channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature, environment
+        )
     with builder.frame("Sky"):
         factor = 2.0**inputs.exposure * inputs.strength * channels.visibility
         sky = environment * gain * factor

@@ -246,6 +246,14 @@ class Vector(Value):
             return self._apply("SCALE", scale=other)
         return self._apply("MULTIPLY", other)
 
+    def __truediv__(self, other: Direction) -> Vector:
+        """Divide component by component."""
+        return self._apply("DIVIDE", other)
+
+    def at_least(self, other: Direction) -> Vector:
+        """The larger of each two components."""
+        return self._apply("MAXIMUM", other)
+
     def cross(self, other: Direction) -> Vector:
         """Cross product."""
         return self._apply("CROSS_PRODUCT", other)

@@ -22,7 +22,7 @@ from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Disk"
-GROUP_VERSION = 3
+GROUP_VERSION = 4
 """Raised whenever the groups' sockets or nodes change; groups with another number are rebuilt."""
 
 VERSION_KEY = "umbra_disk_version"

@@ -14,7 +14,7 @@ from .builder import TreeBuilder
 from .versioned_group import SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra World"
-GROUP_VERSION = 2
+GROUP_VERSION = 3
 VERSION_KEY = "umbra_world_version"
 
 LENSING = SocketSpec(

@@ -174,7 +174,7 @@ def render(
     color_amount, brightness_amount : float
         0 (off) to 1 (physical); see `color.redshift_gain`.
     temperature : float
-        Assumed black-body temperature of the sky in kelvin, > 0.
+        Black-body temperature in kelvin, > 0, of what in the sky is not colored as a black body is.
     exposure : float
         Stops by which the sky is brightened.
     strength : float
@@ -242,7 +242,7 @@ def render(
         colors = sample_filtered(sky_picture[..., :3], levels, directions @ turn.T, covered, looks)
     else:
         colors = sample_environment(sky_picture[..., :3], directions @ turn.T)
-    colors *= redshift_gain(shift, color_amount, brightness_amount, temperature)
+    colors *= redshift_gain(shift, color_amount, brightness_amount, temperature, colors)
     colors *= (2.0**stops * strength * seen)[..., np.newaxis]
     colors[invalid] = MAGENTA
 

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The color of shifted light against Planck's law in SI units and against the CIE's spectral locus."""
 
+import colour
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from physics.light.black_body import SECOND_RADIATION_CONSTANT
-from physics.light.color import CHANNEL_WAVELENGTHS, DEFAULT_TEMPERATURE, redshift_gain
+from physics.light.color import DEFAULT_TEMPERATURE, inverse_temperature, redshift_gain
 
 PLANCK = 6.62607015e-34  # J s
 LIGHT_SPEED = 299792458.0  # m / s
@@ -21,15 +22,53 @@ def planck_by_frequency(frequency: NDArray[np.float64], temperature: float) -> N
     return 2.0 * energy * frequency**2 / LIGHT_SPEED**2 / np.expm1(energy / (BOLTZMANN * temperature))
 
 
-@pytest.mark.parametrize("temperature", [3000.0, 6500.0, 25000.0])
-@pytest.mark.parametrize("channel", [0, 1, 2])
-def test_physical_gain_follows_from_planck_and_liouville(temperature: float, channel: int) -> None:
-    frequency = np.full_like(SHIFTS, LIGHT_SPEED / CHANNEL_WAVELENGTHS[channel])
-    # I_nu / nu^3 is the same at the source, where the frequency was (1 + z) nu, and at the camera.
-    seen = planck_by_frequency(SHIFTS * frequency, temperature) / SHIFTS**3
-    expected = seen / planck_by_frequency(frequency, temperature)
-    gain = redshift_gain(SHIFTS, temperature=temperature)[:, channel]
-    np.testing.assert_allclose(gain, expected, rtol=1e-9)
+OBSERVER = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+PICTURE = colour.RGB_COLOURSPACES["ITU-R BT.709"]
+
+
+def spectral_sum(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    """XYZ of black bodies by colour-science's tables per nanometer."""
+    radiance = colour.colorimetry.planck_law(OBSERVER.wavelengths * 1e-9, temperature)
+    return np.asarray(np.atleast_2d(radiance.T) @ OBSERVER.values * 1e-9)
+
+
+def test_black_bodies_have_the_color_and_luminance_of_the_spectral_sum() -> None:
+    temperature, g = (each.ravel() for each in np.meshgrid(np.geomspace(2e3, 4e4, 60), np.geomspace(0.2, 3.0, 40)))
+    temperature, g = temperature[g * temperature >= 1000.0], g[g * temperature >= 1000.0]
+    seen = spectral_sum(g * temperature)
+    luminance = seen[:, 1:]
+    expected = np.maximum(seen @ PICTURE.matrix_XYZ_to_RGB.T, 0.0)  # as the gamut has it, luminance kept
+    expected *= luminance[:, :1] / (expected @ PICTURE.matrix_RGB_to_XYZ.T)[:, 1:2]
+    light = spectral_sum(temperature) @ PICTURE.matrix_XYZ_to_RGB.T
+    shifted = light * redshift_gain(1.0 / g, temperature=3500.0, light=light)
+    found, wanted = (each @ PICTURE.matrix_RGB_to_XYZ.T / luminance[:, :1] for each in (shifted, expected))
+    np.testing.assert_allclose(found[:, 1], 1.0, atol=0.02)
+    white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    difference = colour.delta_E(*(colour.XYZ_to_Lab(each, white) for each in (found, wanted)), method="CIE 2000")
+    assert difference.max() < 1.0
+
+
+def test_light_below_1000_kelvin_decays() -> None:
+    light = spectral_sum(np.array([2500.0])) @ PICTURE.matrix_XYZ_to_RGB.T
+    shifted = light * redshift_gain(np.linspace(2.4, 12.0, 400), light=np.repeat(light, 400, axis=0))
+    assert (np.diff(shifted, axis=0) < 0.0).all()
+    steps = -np.diff(np.log(shifted), axis=0)
+    assert steps.max() < 0.5
+
+
+def test_what_is_no_black_body_has_the_temperature_of_the_artist() -> None:
+    odd = [[0.0, 0.0, 0.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [np.inf, 1.0, 1.0], [np.nan, 0.0, 0.0], [0.1, 1.0, 0.1]]
+    np.testing.assert_array_equal(inverse_temperature(odd, 4000.0), 0.25)
+    gain = redshift_gain(np.full(6, 1.7), light=odd)
+    np.testing.assert_array_equal(gain, np.broadcast_to(redshift_gain(1.7), (6, 3)))
+
+
+def test_no_edge_between_both() -> None:
+    # From the color of 3000 K to pure green: 1000 K / T moves in small steps.
+    start = (spectral_sum(np.array([3000.0])) @ PICTURE.matrix_XYZ_to_RGB.T)[0]
+    share = np.linspace(0.0, 1.0, 4000)[:, np.newaxis]
+    steps = np.diff(inverse_temperature(start * (1.0 - share) + share * [0.0, start.max(), 0.0], 20000.0))
+    assert np.abs(steps).max() < 5e-3
 
 
 @pytest.mark.parametrize("shift", [0.5, 3.0])
@@ -52,6 +91,8 @@ def test_amounts_are_exponents_of_the_two_parts() -> None:
 
 def test_no_shift_changes_nothing_at_all() -> None:
     np.testing.assert_array_equal(redshift_gain(np.ones((2, 3))), np.ones((2, 3, 3)))
+    light = np.random.default_rng(5).uniform(-0.1, 2.0, (50, 3))
+    np.testing.assert_array_equal(redshift_gain(np.ones(50), light=light), np.ones((50, 3)))
 
 
 def test_redshift_reddens_and_blueshift_makes_bluer() -> None:
@@ -74,24 +115,6 @@ def test_extreme_shifts_do_not_overflow(shift: float) -> None:
 
 def test_second_radiation_constant() -> None:
     assert pytest.approx(PLANCK * LIGHT_SPEED / BOLTZMANN, rel=1e-10) == SECOND_RADIATION_CONSTANT
-
-
-# CIE 1931 chromaticities (x, y) of monochromatic light at two neighboring wavelengths (nm), and the primary between.
-LOCUS = [
-    (610.0, (0.6658, 0.3340), 615.0, (0.6801, 0.3197), (0.64, 0.33)),
-    (545.0, (0.2658, 0.7243), 550.0, (0.3016, 0.6923), (0.30, 0.60)),
-    (460.0, (0.1440, 0.0297), 465.0, (0.1355, 0.0399), (0.15, 0.06)),
-]
-
-
-@pytest.mark.parametrize("channel", [0, 1, 2])
-def test_wavelengths_are_the_dominant_ones_of_the_primaries(channel: int) -> None:
-    start, start_xy, end, end_xy, primary = LOCUS[channel]
-    white = np.array([0.3127, 0.3290])
-    # white + s (primary - white) = start + t (end - start)
-    matrix = np.column_stack([np.subtract(primary, white), np.subtract(start_xy, end_xy)])
-    _, share = np.linalg.solve(matrix, np.subtract(start_xy, white))
-    assert CHANNEL_WAVELENGTHS[channel] * 1e9 == pytest.approx(start + share * (end - start), abs=0.3)
 
 
 def test_refuses_what_is_not_a_frequency_ratio_or_temperature() -> None:
