@@ -36,6 +36,9 @@ TEXTURE_STEPS = 256
 # Custom property of a picture that says what it was made from.
 _MADE_FROM = "umbra_made_from"
 
+# Which law the colors follow; tables of older files do not name one.
+_COLOR_LAW = "CIE 1931"
+
 
 def ensure_colors() -> bpy.types.Image:
     """Return the table of the colors of black bodies, evenly spaced in ln(T), as an image."""
@@ -46,7 +49,7 @@ def ensure_colors() -> bpy.types.Image:
 
     red, _green, _blue = color_spaces.to_scene_linear(np.eye(3)).round(3).tolist()
     space = "" if red == [1.0, 0.0, 0.0] else f" {red}"
-    return _ensure(COLORS_NAME, f"{COLOR_ROWS}{space}", pixels)
+    return _ensure(COLORS_NAME, f"{COLOR_ROWS}{space} {_COLOR_LAW}", pixels)
 
 
 def streaks() -> FloatArray:

@@ -54,18 +54,15 @@ DEFAULT_TEMPERATURE = 6500.0
 """Sky temperature (kelvin) whose black body is closest to the D65 white of the picture's color space."""
 
 LOG_LUMINANCE = (
-    *(
-        19.5530394,
-        0.631906138,
-        0.375926294,
-        -0.0314183906,
-        0.00410038723,
-        -0.0347579736,
-        0.0205685479,
-        0.0331480983,
-        -0.0258371455,
-    ),
-    *(),
+    19.5530394,
+    0.631906138,
+    0.375926294,
+    -0.0314183906,
+    0.00410038723,
+    -0.0347579736,
+    0.0205685479,
+    0.0331480983,
+    -0.0258371455,
 )
 """Coefficients of P, from the constant up."""
 
@@ -93,17 +90,14 @@ GREEN_SHARES = (0.216516, 1.449903)
 """Ratios of green to red from which temperatures are taken: 1835 K to 125000 K."""
 
 INVERSE_TEMPERATURE = (
-    *(
-        0.958989125,
-        -2.93268594,
-        6.50484144,
-        -10.3117331,
-        10.7644377,
-        -7.00500978,
-        2.56269449,
-        -0.403704183,
-    ),
-    *(),
+    0.958989125,
+    -2.93268594,
+    6.50484144,
+    -10.3117331,
+    10.7644377,
+    -7.00500978,
+    2.56269449,
+    -0.403704183,
 )
 """Coefficients of 1000 K / T in green / red, from the constant up."""
 
