@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A panorama of the real night sky: every star to magnitude 8, and the glow of the Milky Way.
+"""A panorama of the real night sky: every star to magnitude 8, and the Milky Way.
 
 Stars are drawn as small Gaussian spots on the sphere, not on the panorama, so they are round in every
 direction, at the celestial poles too, and each spot's light adds up to what its magnitude says exactly.
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from . import black_body
-from .milky_way import COLOR_INDEX, unresolved_glow
+from .milky_way import diffuse_light
 from .star_color import temperature_from_color_index
 
 CATALOG = Path(__file__).parent / "data" / "stars_xhip.npz"
@@ -200,7 +200,7 @@ def star_sky(
     galactic_glow: bool = True,
     star_width: float = 0.6,
 ) -> NDArray[np.float32]:
-    """An equirectangular panorama of the real stars and the Milky Way's glow.
+    """An equirectangular panorama of the real stars and the Milky Way.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def star_sky(
     magnitude_limit : float
         The faintest visual magnitude drawn as a star of its own; the catalog ends at 8.0.
     galactic_glow : bool
-        Whether to add the light of the stars that are not drawn, see `physics.milky_way`.
+        Whether to add the Milky Way, the light of the stars that the catalog does not have; see `milky_way`.
     star_width : float
         Standard deviation of a star's spot in heights of a texel, between 0.3 and 20.
 
@@ -237,10 +237,8 @@ def star_sky(
     stars = load_stars(magnitude_limit)
     picture = draw_stars(stars, height, star_width)
     if galactic_glow:
-        glow = unresolved_glow(float(np.sum(stars.flux)))
-        tint = black_body.color(temperature_from_color_index(COLOR_INDEX))
         for start in range(0, height, _ROWS_AT_ONCE):
             rows = np.arange(start, min(start + _ROWS_AT_ONCE, height))
-            picture[rows] += glow(texel_directions(rows, height))[..., np.newaxis] * tint
+            picture[rows] += diffuse_light(texel_directions(rows, height))
     picture *= ZERO_MAGNITUDE
     return picture.astype(np.float32)

@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..light.environment_lookup import sample_environment
 from ..light.sky_levels import SkyLevels
-from .environment_lookup import sample_environment
 
 FloatArray = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..light.color import DEFAULT_TEMPERATURE, redshift_gain
+from ..light.environment_lookup import sample_environment
 from ..light.sky_levels import sky_levels
 from ..maps.footprint import footprint
 from ..numerics.checks import finite, three
 from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import euler_rotation, unit_vectors
-from .environment_lookup import sample_environment
 from .filtered_sky import sample_filtered
 
 FloatArray = NDArray[np.float64]

@@ -22,7 +22,7 @@ WORLD_BEFORE = "umbra_world_before"
 
 STAR_SKY_NAME = "Umbra Star Sky"
 STAR_SKY_HEIGHT = 2048
-_STAR_SKY_FILE = f"star_sky_{STAR_SKY_HEIGHT}.exr"
+_STAR_SKY_FILE = f"star_sky_{STAR_SKY_HEIGHT}_2.exr"  # the number is raised whenever the picture changes
 
 # Codes of Worlds that show no picture of a sky.
 NO_SKY = frozenset({"sky.plain-color", "sky.no-world"})

@@ -9,7 +9,7 @@ import pytest
 from physics import BlackHoleError
 from physics.light.black_body import LUMINANCE_WEIGHTS
 from physics.light.black_body import color as black_body_color
-from physics.light.milky_way import galactic_axes, unresolved_glow
+from physics.light.milky_way import BAND, BRIGHTNESS, diffuse_light, galactic_axes
 from physics.light.star_color import temperature_from_color_index
 from physics.light.star_sky import (
     ZERO_MAGNITUDE,
@@ -119,10 +119,9 @@ def test_the_seam_is_invisible() -> None:
     np.testing.assert_allclose(on_the_seam, on_the_seam[:, ::-1], rtol=1e-9, atol=1e-9 * on_the_seam.max())
     assert on_the_seam[:, 0].max() > 0.3 * on_the_seam.max()
     # The glow goes on across the seam as smoothly as anywhere else.
-    glow = unresolved_glow(0.0)(texel_directions(np.arange(256), 256))
-    steps = np.abs(np.diff(glow, axis=1, append=glow[:, :1]))
-    assert steps[:, -1].max() <= steps[:, :-1].max()
-    assert steps[:, -1].max() < 0.03 * glow.max()
+    glow = diffuse_light(texel_directions(np.arange(256), 256)) @ LUMINANCE_WEIGHTS
+    steps = np.abs(np.diff(glow, axis=1, append=glow[:, :1])).mean(axis=0)
+    assert steps[-1] < 1.5 * np.median(steps)
 
 
 def test_hot_stars_are_blue_and_cool_stars_are_red() -> None:
@@ -169,38 +168,72 @@ def test_galactic_axes_point_to_the_center_and_the_pole() -> None:
     np.testing.assert_allclose(axes[2], direction(192.8595, 27.1283), atol=2e-5)
 
 
-def test_the_glow_has_the_sky_s_brightness() -> None:
-    """Integrated starlight: some 10 to 50 S10 at the poles, hundreds in the plane, most near the center."""
-    glow = unresolved_glow(0.0)
-    center, sideways, pole = galactic_axes()
-    assert 10.0 < glow(pole) / S10 < 50.0
-    assert 100.0 < glow(sideways) / S10 < 400.0
-    assert 50.0 < glow(-center) / S10 < glow(sideways) / S10
-    assert glow(pole) == pytest.approx(glow(-pole))
-    # Dust hides the center itself: the sky is brightest a few degrees beside the plane.
-    tilted = math.cos(math.radians(5)) * center + math.sin(math.radians(5)) * pole
-    assert 400.0 < glow(tilted) / S10 < 1200.0
-    assert glow(tilted) > glow(center)
+def galactic(longitude: float, latitude: float) -> np.ndarray:
+    """Equatorial direction of galactic coordinates in degrees."""
+    return direction(longitude, latitude) @ galactic_axes()
 
 
-def test_no_light_is_counted_twice() -> None:
-    """The glow and the drawn stars together are the model's light, however many stars are drawn."""
-    height = 128
-    everywhere = texel_directions(np.arange(height), height)
-    omega = row_solid_angles(height)[:, np.newaxis]
-    total = np.sum(unresolved_glow(0.0)(everywhere) * omega)
-    for limit in (4.0, 8.0):
-        drawn = float(load_stars(limit).flux.sum())
-        rest = unresolved_glow(drawn)(everywhere)
-        assert np.all(rest >= 0.0)
-        assert np.sum(rest * omega) + drawn == pytest.approx(total, rel=3e-3)
-    assert not np.any(unresolved_glow(1e6)(everywhere))
+def seen_around(longitude: float, latitude: float, reach: float) -> np.ndarray:
+    """Mean light within some degrees of a place in galactic coordinates."""
+    across, up = np.meshgrid(np.linspace(-reach, reach, 41), np.linspace(-reach, reach, 41))
+    places = [galactic(longitude + x, latitude + y) for x, y in zip(across.ravel(), up.ravel(), strict=True)]
+    return diffuse_light(np.array(places)).mean(axis=0)
 
 
-def test_the_sky_is_the_stars_and_the_glow() -> None:
+def test_the_milky_way_has_the_sky_s_brightness() -> None:
+    """Integrated starlight: hundreds of S10 in the plane, most near the center, little at the poles.
+
+    Leinert et al. 1998, A&AS 127, 1, section 10: 20 to 60 S10 at the poles, of which the catalog's stars are half.
+    """
+    degrees = np.arange(-89.5, 90.0)
+    band = degrees[np.abs(degrees) < math.degrees(BAND)]
+    light = np.array(
+        [[diffuse_light(galactic(length, b)) @ LUMINANCE_WEIGHTS for length in range(0, 360, 2)] for b in band]
+    )
+    mean = np.average(light.mean(axis=1), weights=np.cos(np.radians(band)))
+    assert mean == pytest.approx(BRIGHTNESS, rel=0.03)  # at 1 and 2 degrees
+    assert 100.0 < mean / S10 < 400.0
+    assert light.std() / light.mean() > 0.35
+    assert diffuse_light(galactic(0.0, 89.0)) @ LUMINANCE_WEIGHTS < 20.0 * S10
+
+
+def test_the_center_is_bright_and_yellow() -> None:
+    center, away = seen_around(0.0, 0.0, 5.0), seen_around(180.0, 0.0, 5.0)
+    assert center @ LUMINANCE_WEIGHTS > 4.0 * (away @ LUMINANCE_WEIGHTS)
+    reddest = black_body_color(5000.0)
+    assert center[0] / center[2] > reddest[0] / reddest[2]
+
+
+@pytest.mark.parametrize(
+    ("longitude", "latitude", "reach", "is_bright"),
+    [
+        (280.5, -32.9, 2.0, True),  # the Large Magellanic Cloud
+        (302.8, -44.3, 1.0, True),  # the Small one
+        (303.0, -0.5, 1.5, False),  # the Coalsack
+        (353.0, 16.5, 2.0, False),  # rho Ophiuchi's cloud
+        (172.0, -14.0, 3.0, False),  # the Taurus cloud
+    ],
+)
+def test_clouds_are_where_they_are(longitude: float, latitude: float, reach: float, is_bright: bool) -> None:
+    """As bright or dark spots against the mean of what lies 3 reaches around them."""
+    spot = seen_around(longitude, latitude, reach) @ LUMINANCE_WEIGHTS
+    around = seen_around(longitude, latitude, 3.0 * reach) @ LUMINANCE_WEIGHTS
+    assert spot > 1.5 * around if is_bright else spot < 0.8 * around
+
+
+def test_the_sky_is_the_stars_and_the_milky_way() -> None:
     picture, alone = star_sky(64), star_sky(64, galactic_glow=False)
-    glow = unresolved_glow(float(load_stars().flux.sum()))(texel_directions(np.arange(64), 64)) * ZERO_MAGNITUDE
-    np.testing.assert_allclose((picture - alone) @ LUMINANCE_WEIGHTS, glow, rtol=2e-3, atol=1e-6)
+    glow = diffuse_light(texel_directions(np.arange(64), 64)) * ZERO_MAGNITUDE
+    np.testing.assert_allclose(picture - alone, glow, rtol=2e-3, atol=1e-6)
+
+
+def test_black_space_is_black() -> None:
+    """At the exposure that the add-on gives the sky, 2.5 stops: half of the texels away from the band."""
+    sky = star_sky(1024) * 2.0**2.5
+    away = np.abs(np.arcsin(texel_directions(np.arange(1024), 1024) @ galactic_axes()[2])) > math.radians(30.0)
+    median = np.median(sky[away] @ LUMINANCE_WEIGHTS)
+    assert 255.0 * 12.92 * median < 12.0  # sRGB's linear part (IEC 61966-2-1)
+    assert sky.max() > 1.0
 
 
 @pytest.mark.parametrize(
