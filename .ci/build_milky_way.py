@@ -38,6 +38,7 @@ COMPRESSION_LEVEL = 45.0  # of DWAA: 0.4 % of the mean light
 
 
 def main() -> None:
+    """Read the source and write the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("source", type=Path)
     with Image.open(parser.parse_args().source) as picture:
