@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from galaxy_model import unresolved_glow
 
 from physics import BlackHoleError
 from physics.light.black_body import LUMINANCE_WEIGHTS
@@ -195,6 +196,14 @@ def test_the_milky_way_has_the_sky_s_brightness() -> None:
     assert 100.0 < mean / S10 < 400.0
     assert light.std() / light.mean() > 0.35
     assert diffuse_light(galactic(0.0, 89.0)) @ LUMINANCE_WEIGHTS < 20.0 * S10
+
+
+def test_the_brightness_is_the_models() -> None:
+    """A double-exponential disc behind dust, less the stars of the catalog."""
+    model = unresolved_glow(float(load_stars().flux.sum()))
+    degrees = np.arange(-14.5, 15.0)
+    light = [model(np.array([galactic(length, b) for length in range(0, 360, 2)])).mean() for b in degrees]
+    assert np.average(light, weights=np.cos(np.radians(degrees))) == pytest.approx(BRIGHTNESS, rel=0.01)
 
 
 def test_the_center_is_bright_and_yellow() -> None:
