@@ -8,7 +8,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
-from physics import DISK_SETTINGS, SKY_SETTINGS, Setting  # noqa: E402  found only now
+from physics import DISK_SETTINGS, MATTER_SETTINGS, SKY_SETTINGS, Setting  # noqa: E402  found only now
 
 _PLACE = re.compile(r"(<!-- settings: (\w+) -->\n).*?(<!-- end of settings -->\n)", re.DOTALL)
 
@@ -41,8 +41,14 @@ def sky_table() -> str:
     return "| control | `python -m physics render` | |\n|---|---|---|\n" + "".join(rows)
 
 
-TABLES = {"disk": disk_table, "sky": sky_table}
-PAGES = (DOCS / "disk_settings.md", DOCS / "sky.md")
+def light_table() -> str:
+    """Return the table of the look of a layer of light."""
+    rows = [f"| {setting.label} | {_option(setting)} | {_meaning(setting)} |\n" for setting in MATTER_SETTINGS.values()]
+    return "| setting | `python -m physics bake` | |\n|---|---|---|\n" + "".join(rows)
+
+
+TABLES = {"disk": disk_table, "sky": sky_table, "light": light_table}
+PAGES = (DOCS / "disk_settings.md", DOCS / "sky.md", DOCS / "disk_light.md")
 
 
 def filled(page: str) -> str:

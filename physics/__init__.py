@@ -2,8 +2,8 @@
 """Rays of light around a spinning (Kerr) black hole, and the maps and pictures made of them.
 
 Hands on the documented API, which is all that the add-on and other programs use. The rooms, from camera and hole to a
-file: `shot`, `kerr`, `geodesics`, `sampling`, `disk_passes`, `maps`, `files`; `light` and `reference` turn maps into
-pictures, `accuracy_check` judges them, `cli` is the command line, `images` and `numerics` serve all.
+file: `shot`, `kerr`, `geodesics`, `sampling`, `disk_passes`, `maps`, `files`; `light`, `matter` and `reference` turn
+maps into pictures, `accuracy_check` judges them, `cli` is the command line, `images` and `numerics` serve all.
 """
 
 from .numerics import interrupts  # noqa: F401  before all that takes time
@@ -32,6 +32,8 @@ from .files.exit_map_file import FORMAT as EXIT_MAP_FORMAT
 from .files.exit_map_file import read_exit_map, read_exit_map_metadata, write_exit_map
 from .files.footprint_file import FORMAT as FOOTPRINT_FORMAT
 from .files.footprint_file import footprint_path, read_footprint, write_footprint
+from .files.light_layer_file import FORMAT as LIGHT_LAYER_FORMAT
+from .files.light_layer_file import light_layer_path, read_light_layer, write_light_layer
 from .files.map_check import Finding as MapFinding
 from .files.map_check import State as MapState
 from .files.map_check import check_map
@@ -87,6 +89,13 @@ from .light.disk_texture import TURN_BETWEEN as DISK_PATTERN_TURN
 from .light.disk_texture import disk_texture
 from .light.disk_texture import pattern_period as disk_pattern_period
 from .light.disk_texture import pattern_shares as disk_pattern_shares
+from .light.matter_settings import (
+    MATTER_PRESET_TABLE,
+    MATTER_PRESETS,
+    MATTER_SETTINGS,
+    MatterLook,
+    MatterPreset,
+)
 from .light.milky_way import galactic_axes
 from .light.settings import Choice, Setting
 from .light.sky_levels import FEWEST_ROWS as FEWEST_SKY_ROWS
@@ -109,6 +118,7 @@ from .maps.world_map import STAMP as WORLD_MAP_STAMP
 from .maps.world_map import WorldMap
 from .maps.world_map import world_map_steps as bake_world_map_steps
 from .maps.world_map import world_parameters as world_map_parameters
+from .matter.light_layer import LightLayer, clock_rate, render_matter
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .numerics.work import drain
@@ -166,6 +176,10 @@ __all__ = [
     "INVALID_MAP_COLOR",
     "LARGEST_HALF",
     "LARGEST_ONE_PLUS_Z",
+    "LIGHT_LAYER_FORMAT",
+    "MATTER_PRESETS",
+    "MATTER_PRESET_TABLE",
+    "MATTER_SETTINGS",
     "METHODS",
     "MONOCHROMATIC_EXPONENT",
     "MOST_CROSSINGS",
@@ -202,10 +216,13 @@ __all__ = [
     "Fate",
     "ImageFileError",
     "LensNumbers",
+    "LightLayer",
     "MapBaker",
     "MapFinding",
     "MapFormat",
     "MapState",
+    "MatterLook",
+    "MatterPreset",
     "Observer",
     "PanoramaCamera",
     "PerspectiveCamera",
@@ -234,6 +251,7 @@ __all__ = [
     "black_body_temperature",
     "check_accuracy",
     "check_map",
+    "clock_rate",
     "color_law",
     "disk_color",
     "disk_density",
@@ -254,6 +272,7 @@ __all__ = [
     "galactic_axes",
     "horizon_radius",
     "isco_radius",
+    "light_layer_path",
     "linear_from_srgb",
     "load_stars",
     "local_velocity",
@@ -272,6 +291,7 @@ __all__ = [
     "read_exr",
     "read_exr_header",
     "read_footprint",
+    "read_light_layer",
     "read_star_catalog",
     "read_stars",
     "read_warp_map",
@@ -281,6 +301,7 @@ __all__ = [
     "redshift_factor",
     "redshift_gain",
     "relative_disk_flux",
+    "render_matter",
     "render_reference",
     "replacing_file",
     "shade_disk",
@@ -300,6 +321,7 @@ __all__ = [
     "write_exit_map",
     "write_exr",
     "write_footprint",
+    "write_light_layer",
     "write_map_files",
     "write_png",
     "write_stars",

@@ -10,12 +10,14 @@ import os
 import time
 from pathlib import Path
 
-from ..files import star_file, warp_map_file
+from ..files import light_layer_file, star_file, warp_map_file
 from ..files.companions import files_beside, write_companions
+from ..files.light_layer_file import light_layer_path, write_light_layer
 from ..files.warp_map_file import write_warp_map
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
 from ..images.exr import replacing
 from ..maps.warp_map import WarpMap, bake
+from ..matter.light_layer import clock_rate, render_matter
 from ..numerics.errors import BlackHoleError
 from ..shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
 from ..shot.map_parameters import (
@@ -66,6 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     disk_options.add_bake_options(parser)
     star_options.add_bake_options(parser)
+    disk_options.add_light_options(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -112,9 +115,12 @@ def run(options: argparse.Namespace) -> None:
         disk=disk_options.disk_of(options),
     )
     parameters.validate()
+    light = disk_options.light_of(options)
     beside = dict(files_beside(options.output, parameters, optional=options.footprint))
     if options.stars:
         beside[Path(star_file.stars_path(options.output))] = star_file.FORMAT
+    if light:
+        beside[Path(light_layer_path(options.output))] = light_layer_file.FORMAT
     check_maps({options.output: warp_map_file.FORMAT, **beside})
     warning = unstable_orbit_warning(parameters)
     if warning:
@@ -122,6 +128,12 @@ def run(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     stars = star_options.layer_of(options, parameters)
     warp_map = bake(parameters, progress=ProgressPrinter())
+    layer = None
+    if light:
+        look, moment = light
+        if options.light_clock == "camera":
+            moment /= clock_rate(parameters.spin, parameters.observer())
+        layer = render_matter(warp_map, look, moment)
     with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
         map_file = together.enter_context(replacing(options.output))
         write_companions(
@@ -132,6 +144,8 @@ def run(options: argparse.Namespace) -> None:
         )
         if stars is not None:
             star_file.write_stars(together.enter_context(replacing(star_file.stars_path(options.output))), stars)
+        if layer is not None:
+            write_light_layer(together.enter_context(replacing(light_layer_path(options.output))), layer)
         write_warp_map(map_file, warp_map)
         say("\n".join(_summary(options.output, list(beside), warp_map, time.perf_counter() - started)))
     lost, unresolved = warp_map.counts.get("disk_unresolved", 0), warp_map.counts["unresolved"]

@@ -5,16 +5,23 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+from collections.abc import Mapping
+from typing import TypeVar
 
 from ..files.disk_pass_file import read_disk_passes
 from ..geodesics.disk_tracer import DEFAULT_CROSSINGS
 from ..light.disk_settings import DISK_SETTINGS, PRESETS, DiskLook
 from ..light.disk_texture import disk_texture
+from ..light.matter_settings import MATTER_PRESETS, MATTER_SETTINGS, MatterLook
+from ..light.settings import Setting
 from ..maps.warp_map import WarpMap
+from ..matter.light_layer import check_time
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError
 from ..reference.disk_render import disk_layers, over_sky
 from ..shot.disk import DEFAULT_OUTER_RADIUS, Disk
+
+Look = TypeVar("Look", DiskLook, MatterLook)
 
 
 def add_bake_options(parser: argparse.ArgumentParser) -> None:
@@ -39,7 +46,12 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--disk-look", choices=tuple(PRESETS), default="physical", help="how the disk looks")
     parser.add_argument("--disk-time", type=float, default=0.0, help="time at which it is seen, in M")
     look = parser.add_argument_group("the disk's look", "in place of the values that --disk-look has")
-    for setting in DISK_SETTINGS.values():
+    add_settings(look, DISK_SETTINGS)
+
+
+def add_settings(look: argparse._ArgumentGroup, settings: Mapping[str, Setting]) -> None:
+    """Add an option for each row of a table."""
+    for setting in settings.values():
         added = "; added to the look's own value" if setting.is_added else ""
         look.add_argument(
             setting.option,
@@ -49,6 +61,39 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
             metavar=None if setting.choices else "VALUE",
             help=setting.sentence + added,
         )
+
+
+def add_light_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which layer of light is rendered along with a map."""
+    parser.add_argument("--light", action="store_true", help="render the disk's light too, as a layer beside the map")
+    parser.add_argument("--light-look", choices=tuple(MATTER_PRESETS), default="physical", help="how the disk looks")
+    parser.add_argument("--light-time", type=float, default=0.0, help="time at which it is seen, in M")
+    parser.add_argument(
+        "--light-clock",
+        choices=("far", "camera"),
+        default="far",
+        help="whose time that is: that of clocks far away, or the camera's own, which runs slower",
+    )
+    look = parser.add_argument_group("the light's look", "in place of the values that --light-look has")
+    add_settings(look, MATTER_SETTINGS)
+
+
+def light_of(options: argparse.Namespace) -> tuple[MatterLook, float] | None:
+    """Return the look that the options of ``bake`` ask for, and its time by the clock that they name.
+
+    Raises
+    ------
+    BlackHoleError
+        If a layer is described but not asked for, there is no disk, or a setting is out of its range.
+    """
+    look, changed = chosen(options, "light", MATTER_PRESETS[options.light_look], MATTER_SETTINGS)
+    if not options.light:
+        if changed:
+            raise BlackHoleError("The light's settings are given without it; add --light.", code="command.no-disk")
+        return None
+    if not options.disk:
+        raise BlackHoleError("There is no light without a disk; add --disk.", code="command.no-disk")
+    return look, check_time(options.light_time)
 
 
 def disk_of(options: argparse.Namespace) -> Disk | None:
@@ -92,11 +137,21 @@ def look_of(options: argparse.Namespace) -> DiskLook:
     BlackHoleError
         If a setting is out of its range.
     """
-    look = PRESETS[options.disk_look]
-    changes = {name: value for name in DISK_SETTINGS if (value := getattr(options, f"disk_{name}", None)) is not None}
+    return chosen(options, "disk", PRESETS[options.disk_look], DISK_SETTINGS)[0]
+
+
+def chosen(options: argparse.Namespace, prefix: str, look: Look, settings: Mapping[str, Setting]) -> tuple[Look, bool]:
+    """Return a look with the settings that the options give in place of its own, and whether they give any.
+
+    Raises
+    ------
+    BlackHoleError
+        If a setting is out of its range.
+    """
+    changes = {name: value for name in settings if (value := getattr(options, f"{prefix}_{name}", None)) is not None}
     for name in changes:
-        if DISK_SETTINGS[name].is_added:
+        if settings[name].is_added:
             changes[name] += getattr(look, name)
     look = dataclasses.replace(look, **changes)
     look.validate()
-    return look
+    return look, bool(changes)

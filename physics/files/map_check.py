@@ -15,7 +15,7 @@ from ..images.exr_header import MAGIC
 from ..numerics.errors import ImageFileError, WarpMapError
 from ..shot.identity import hash_of
 from ..shot.map_parameters import WarpMapParameters
-from . import exit_map_file, star_file, warp_map_file, world_map_file
+from . import exit_map_file, light_layer_file, star_file, warp_map_file, world_map_file
 from .companions import COMPANIONS
 from .map_file import ATTRIBUTE_FORMAT, MapFormat
 
@@ -25,6 +25,7 @@ READERS: dict[MapFormat, Callable[[PathLike], object]] = {
     exit_map_file.FORMAT: exit_map_file.read_exit_map,
     world_map_file.FORMAT: world_map_file.read_world_map,
     star_file.FORMAT: star_file.read_stars,
+    light_layer_file.FORMAT: light_layer_file.read_light_layer,
     **{each.format: each.read for each in COMPANIONS},
 }
 

@@ -87,6 +87,32 @@ class View:
         along = self._camera.component(x * self._per_pixel, y * self._per_pixel, self._camera_to_triad @ vector)
         return constant + along
 
+    def carter(self, x: Array, y: Array) -> Array:
+        """Return Carter's constant q of light of camera energy 1, at map pixel coordinates which may broadcast.
+
+        By Eq. 8. Times the Doppler factor of Eq. 13, the light of Eq. 5 is an affine function of where the camera
+        looks, and so are the momenta of Eq. 7.
+        """
+        metric = metric_functions(self._spin, self._observer.r, self._observer.theta)
+        looking = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+        light, doppler = light_in_fido_frame(self._observer, looking, np.eye(3))
+        light *= doppler
+        cos = math.cos(self._observer.theta)
+        polar, azimuthal, energy = (
+            values[0]
+            + self._camera.component(
+                x * self._per_pixel, y * self._per_pixel, self._camera_to_triad @ (values[1:] - values[0])
+            )
+            for values in (
+                metric.rho * light[1],
+                metric.sigma / metric.rho * light[2],
+                metric.alpha * doppler + metric.omega * metric.varpi * light[2],
+            )
+        )
+        spinning = self._spin * energy
+        found: Array = polar * polar + (cos * cos) * (azimuthal * azimuthal - spinning * spinning)
+        return found
+
     def crossings(
         self,
         x: Array,
