@@ -17,6 +17,7 @@ import animations
 import disks
 import lens
 import maps
+import matter
 import plots
 import skies
 import tracing
@@ -41,6 +42,7 @@ def main() -> None:
     table.add(tracing.rows(options.repeats, options.kgeo))
     table.add(maps.rows(options.repeats))
     table.add(["", *disks.lines(options.repeats), ""])
+    table.add(["", *matter.lines(options.repeats), ""])
     table.add(animations.rows(options.frames, options.orbit_frames))
     table.add(lens.rows(min(options.repeats, LENS_REPEATS)))
     table.add(["", *skies.lines(min(options.repeats, LENS_REPEATS))])

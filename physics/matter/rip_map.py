@@ -62,7 +62,8 @@ class RipMap:
                 lost[down, across] = 1.0 - here.real.var(), 1.0 - here.imag.var()
                 here = np.complex64(0.5) * (here[:, ::2] + here[:, 1::2])
             row = np.complex64(0.5) * (row[::2] + row[1::2])
-        self._atlas = np.concatenate(parts)
+        # numpy takes whole numbers more than twice as fast as complex ones of the same size.
+        self._atlas = np.concatenate(parts).view(np.uint64)
         self._bases = np.array(bases, dtype=np.int32)
         self._lost = np.clip(lost, 0.0, 1.0).reshape(-1, 2).astype(np.float32)
 
@@ -108,13 +109,13 @@ class RipMap:
         upper += levels.base
         lower *= width
         lower += levels.base
-        found: Complex = self._atlas.take(upper + first)
-        step = self._atlas.take(upper + second)
+        found: Complex = self._atlas.take(upper + first).view(np.complex64)
+        step = self._atlas.take(upper + second).view(np.complex64)
         step -= found
         step *= x
         found += step
-        below = self._atlas.take(lower + first)
-        step = self._atlas.take(lower + second)
+        below = self._atlas.take(lower + first).view(np.complex64)
+        step = self._atlas.take(lower + second).view(np.complex64)
         step -= below
         step *= x
         below += step

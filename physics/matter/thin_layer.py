@@ -22,7 +22,7 @@ from .surface import Surface
 BLOCK = 1 << 16
 """Pixels shaded at a time: their values stay in the cache."""
 
-TEXELS_PER_TAP, MOST_TAPS = 1.5, 16
+TEXELS_PER_TAP, MOST_TAPS = 3.0, 16
 
 LEAST_TAPPED = 1e-2
 """Least 1 / r of a tap over that of its pixel."""
