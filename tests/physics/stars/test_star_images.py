@@ -129,7 +129,7 @@ def test_magnification_is_the_exact_determinant() -> None:
     exact = 1.0 / (2.0 * math.sin(theta) * np.abs(rays.radial * rays.polar) * determinant / rays.one_plus_z**2)
     scale = np.abs(found / exact)[regular]
     assert regular.sum() > 100
-    np.testing.assert_allclose(scale / np.median(scale), 1.0, rtol=2e-3)
+    np.testing.assert_allclose(scale, 1.0, rtol=2e-3)
 
 
 def test_each_image_of_a_hole_without_spin_covers_the_sky_once() -> None:
