@@ -59,7 +59,7 @@ def add_settings(look: argparse._ArgumentGroup, settings: Mapping[str, Setting])
             choices=[choice.value for choice in setting.choices] or None,
             default=argparse.SUPPRESS,
             metavar=None if setting.choices else "VALUE",
-            help=setting.sentence + added,
+            help=(setting.sentence + added).replace("%", "%%"),
         )
 
 

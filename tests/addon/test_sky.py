@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from small_scene import (
     add_hole,
+    compositor,
     environment_image,
     environment_pixels,
     links_of,
@@ -333,6 +334,9 @@ def test_output_world_bends_what_is_in_a_group(
     bare(scene, "group")
     add_hole(scene, sky=False, mass_scale=0.3)
     scene.umbra.redshift_color = scene.umbra.redshift_brightness = 0.0
+    group = next(node for node in compositor(scene).nodes if node.get("umbra_role") == "group")
+    for name in ("Redshift Color", "Redshift Brightness"):
+        group.inputs[name].default_value = 0.0
     pictures = []
     for output in ("COMPOSITOR", "WORLD"):
         bpy.ops.umbra.set_output(output=output)

@@ -50,6 +50,7 @@ def open_scene(name: str, maps: Path) -> object:
     bpy.ops.wm.open_mainfile(filepath=str(BLEND_FILES / f"{name}.blend"))
     opened = bpy.context.scene
     opened.umbra.map_folder = str(maps)
+    opened.umbra.sky_filter = "OFF"  # what it makes of a sky has tests of its own
     opened.render.resolution_x, opened.render.resolution_y = SIZE
     opened.cycles.samples = 4
     opened.cycles.use_denoising = False

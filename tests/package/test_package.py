@@ -92,7 +92,7 @@ def test_versions_agree(manifest: dict) -> None:
 def test_manifest_covers_the_supported_blenders(manifest: dict) -> None:
     assert manifest["blender_version_min"] == "4.5.0"
     assert tuple(map(int, manifest["blender_version_max"].split("."))) > (5, 2, 99)
-    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later", "SPDX:CC-BY-SA-4.0"]
     assert set(manifest["permissions"]) == {"files"}
 
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light of black bodies against colour-science, which sums the CIE's tables per nanometer."""
 
-import colour
 import numpy as np
 import pytest
 
 from physics.light import black_body
 from physics.light.cie_1931 import MATCHING_FUNCTIONS, WAVELENGTHS
+
+with np.printoptions():  # which it sets for the whole process
+    import colour
 
 OBSERVER = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
 PICTURE = colour.RGB_COLOURSPACES["ITU-R BT.709"]

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The color of shifted light against Planck's law in SI units and against the CIE's spectral locus."""
 
-import colour
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from physics.light.black_body import SECOND_RADIATION_CONSTANT
 from physics.light.color import DEFAULT_TEMPERATURE, inverse_temperature, redshift_gain
+
+with np.printoptions():  # which it sets for the whole process
+    import colour
 
 PLANCK = 6.62607015e-34  # J s
 LIGHT_SPEED = 299792458.0  # m / s
