@@ -36,7 +36,7 @@ HARMLESS: tuple[str, ...] = ()
 # How a render that is refused says so, by the extension; the rest of its sentence is checked where it is caused.
 REFUSAL = r"Error: Umbra Black Hole: .+ \[[a-z]+\.[a-z-]+\]"
 TOLERANCE = 2e-3
-"""Largest difference allowed from the reference: the levels of the sky, up to 1.7, are half floats, 2^-11, twice that."""
+"""Largest difference allowed from the reference: twice what half floats, 2^-11, lose of levels up to 1.7."""
 LOOKS = 8
 """Of the filter that a new scene has."""
 
