@@ -8,6 +8,8 @@ artist's disk without motion, to 1, physics: temperature g^color T, brightness g
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..numerics.arrays import Array
@@ -24,13 +26,19 @@ SMALLEST_G, SMALLEST_ALPHA = 1e-6, 1e-6
 # How many colors are tabulated, evenly in the logarithm of the temperature.
 COLORS = 512
 _TABLE = np.linspace(np.log(COLDEST), np.log(HOTTEST), COLORS)
-_COLORS = black_body.color(np.exp(_TABLE))
+
+
+@functools.cache
+def _colors() -> Array:
+    """Colors at the table's temperatures; made when they are first asked for, not when the module is imported."""
+    return black_body.color(np.exp(_TABLE))
 
 
 def seen_color(temperature: Array) -> Array:
     """Return a black body's color, linear Rec. 709 of luminance 1, shape (..., 3), from a table."""
     place = np.log(np.clip(temperature, COLDEST, HOTTEST))
-    return np.stack([np.interp(place, _TABLE, _COLORS[:, i]) for i in range(3)], axis=-1)
+    colors = _colors()
+    return np.stack([np.interp(place, _TABLE, colors[:, i]) for i in range(3)], axis=-1)
 
 
 def emission(look: DiskLook, disk: Disk, spin: float, radius: Array, g: Array) -> Array:
