@@ -5,9 +5,11 @@ A window beside the shadow at the scale of full HD: spin 0.9, 30 M away, 10 degr
 degrees per frame. The truth has many rays per pixel. Rings are counted from the shadow's edge in units of its radius.
 """
 
+import importlib.util
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -36,6 +38,13 @@ class Flicker:
     """Mean difference from the truth."""
     change: float
     """Mean change of a pixel from one frame to the next."""
+
+
+def hdri() -> np.ndarray | None:
+    """An HDRI that comes with Blender's module, 1024 x 512; None without it."""
+    blender = importlib.util.find_spec("bpy")
+    found = list(Path(blender.origin).parent.glob("**/studiolights/world/city.exr")) if blender is not None else []
+    return np.maximum(physics.read_exr(found[0])[0][..., :3].astype(np.float64), 0.0) if found else None
 
 
 def looks(count: int) -> Picture:

@@ -38,10 +38,9 @@ def lines(repeats: int) -> Iterator[str]:
     yield "light beside the shadow, one frame and its change to the next, % of the mean light, by rings of 1 to 3,"
     yield "3 to 10 and 10 to 20 % of the shadow's radius; the truth has 16 x 16 rays per pixel:"
     skies = {"stars, 4096 x 2048": np.asarray(physics.star_sky(2048))}
-    blender = importlib.util.find_spec("bpy")
-    found = list(Path(blender.origin).parent.glob("**/studiolights/world/city.exr")) if blender is not None else []
-    if found:
-        skies["HDRI, 1024 x 512"] = np.maximum(physics.read_exr(found[0])[0][..., :3].astype(np.float64), 0.0)
+    city = flicker.hdri()
+    if city is not None:
+        skies["HDRI, 1024 x 512"] = city
     ways = {"off": flicker.looks(0), "fast": flicker.looks(8), "best": flicker.looks(16)}
     ways |= {"2 x 2": flicker.rays(2), "4 x 4": flicker.rays(4), "truth": flicker.rays(16)}
     for name, sky in skies.items():
@@ -50,7 +49,7 @@ def lines(repeats: int) -> Iterator[str]:
             error = ", ".join(f"{100 * ring.error:5.1f}" for ring in rings)
             change = ", ".join(f"{100 * ring.change:5.1f}" for ring in rings)
             yield f"        {way:8s} off by {error}   change {change}"
-    if blender is None:
+    if importlib.util.find_spec("bpy") is None:
         yield "compositing: not measured, because this Python has no module bpy."
         return
     yield "compositing a frame of stars in Blender, all cores: processor seconds, seconds, peak memory of the process"

@@ -5,9 +5,6 @@ The bounds are what a still picture and a moving one can bear; one ray per pixel
 the ring from 3 to 10 % of the shadow's radius.
 """
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 from galaxy_model import COLOR_INDEX, unresolved_glow
@@ -26,15 +23,6 @@ MOST_CHANGE = 1.3
 WAYS = {"truth": flicker.rays(RAYS), "fast": flicker.looks(8), "best": flicker.looks(16)}
 
 
-def city() -> np.ndarray:
-    """An HDRI that comes with Blender, 1024 x 512."""
-    spec = importlib.util.find_spec("bpy")
-    found = list(Path(spec.origin).parent.glob("**/studiolights/world/city.exr")) if spec is not None else []
-    if not found:
-        pytest.skip("no Blender here, whose HDRI this needs")
-    return np.maximum(physics.read_exr(found[0])[0][..., :3].astype(np.float64), 0.0)
-
-
 def check(sky: np.ndarray, bounds: dict[str, tuple[float | None, ...]]) -> None:
     measured = flicker.measure(WAYS, "truth", sky)
     for name, wanted in bounds.items():
@@ -46,7 +34,10 @@ def check(sky: np.ndarray, bounds: dict[str, tuple[float | None, ...]]) -> None:
 
 
 def test_an_hdri() -> None:
-    check(city(), {"fast": (0.04, 0.018, 0.009), "best": (0.022, 0.012, 0.008)})
+    city = flicker.hdri()
+    if city is None:
+        pytest.skip("no Blender here, whose HDRI this needs")
+    check(city, {"fast": (0.04, 0.018, 0.009), "best": (0.022, 0.012, 0.008)})
 
 
 def test_stars() -> None:
