@@ -120,7 +120,7 @@ class TreeBuilder:
         return node
 
     def rotation_rows(self, euler: Vector) -> list[Vector]:
-        """Rows of the matrix that rotates by XYZ Euler angles: cheaper than `rotated` where all pixels share them."""
+        """Rows of the matrix that rotates about the origin by XYZ Euler angles in radians."""
         rows = []
         for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
             node = self.node("ShaderNodeVectorRotate")
@@ -269,14 +269,6 @@ class Vector(Value):
     def normalized(self) -> Vector:
         """The vector of length 1 in the same direction."""
         return self._apply("NORMALIZE")
-
-    def rotated(self, euler: Vector) -> Vector:
-        """The vector rotated about the origin by XYZ Euler angles in radians."""
-        node = self.builder.node("ShaderNodeVectorRotate")
-        node.rotation_type = "EULER_XYZ"
-        self.builder.feed(node.inputs["Vector"], self)
-        self.builder.feed(node.inputs["Rotation"], euler)
-        return Vector(self.builder, node.outputs[0])
 
     def turned(self, rows: Sequence[Vector]) -> tuple[Float, Float, Float]:
         """Components of the vector multiplied by a matrix, by its rows."""
