@@ -115,7 +115,7 @@ def spherical_triad(theta: float, phi: float) -> Array:
 
 
 def euler_rotation(euler: ArrayLike) -> Array:
-    """Return the rotation of XYZ Euler angles.
+    """Return the rotation of XYZ Euler angles, as of Blender's Mapping node (type Point).
 
     Parameters
     ----------

@@ -85,22 +85,6 @@ class ReferencePicture:
     redshift: FloatArray
 
 
-def rotation_matrix(euler: ArrayLike) -> FloatArray:
-    """Rotation of Blender's Mapping node (type Point) for XYZ Euler angles.
-
-    Parameters
-    ----------
-    euler : array_like, shape (3,)
-        Angles about x, y and z in radians; applied in this order about fixed axes.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        R = Rz Ry Rx: the direction to look up is R d.
-    """
-    return euler_rotation(euler)
-
-
 def invalid_pixels(warp_map: WarpMapLike) -> BoolArray:
     """Return which pixels no valid warp map can have.
 
@@ -233,7 +217,7 @@ def render(
     shift = np.where(invalid, 1.0, one_plus_z)
     seen = np.where(invalid, 1.0, visibility)
     directions = unit_vectors(np.where(invalid, 0.0, theta), np.where(invalid, 0.0, phi))
-    turn = rotation_matrix(rotation)
+    turn = euler_rotation(rotation)
     if looks:
         covered = footprint(warp_map).astype(np.float64)
         covered[..., :3] = covered[..., :3] @ turn.T

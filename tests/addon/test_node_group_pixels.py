@@ -85,7 +85,7 @@ def test_noise_in_all_directions(group: GroupRenderer, rotation: tuple[float, ..
         # A tilted direction is a float32 vector, accurate to 1e-7 rad; close to the environment's pole its longitude
         # is not, and the pole's row of noise differs with the longitude.
         directions = sphere.unit_vectors(warp_map[..., 0], warp_map[..., 1])
-        x, y, _ = np.moveaxis(directions @ reference_render.rotation_matrix(angles).T, -1, 0)
+        x, y, _ = np.moveaxis(directions @ sphere.euler_rotation(angles).T, -1, 0)
         error = error * np.hypot(x, y)
     assert error.max() <= TEXELS
 

@@ -30,7 +30,6 @@ from compositor_scene import (
 from mathutils import Euler, Matrix
 
 from physics.numerics import sphere
-from physics.reference import reference_render
 
 SIZE = (64, 36)
 STRENGTH = 1.7
@@ -106,7 +105,7 @@ def test_identity_map_shows_the_world_as_cycles_does(
         values={"Environment Rotation": rotation, "Environment Strength": STRENGTH},
     )
     directions = sphere.unit_vectors(warp_map[..., 0], warp_map[..., 1])
-    x, y, _ = np.moveaxis(directions @ reference_render.rotation_matrix(rotation).T, -1, 0)
+    x, y, _ = np.moveaxis(directions @ sphere.euler_rotation(rotation).T, -1, 0)
     apart = np.hypot(x, y) > 0.5 * math.pi / sky.shape[0]
     assert apart.mean() > 0.99
     np.testing.assert_allclose(by_group[apart], by_cycles[apart], rtol=0.0, atol=5e-5)

@@ -84,7 +84,7 @@ def predicted(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tu
     """Numpy's picture of the frame, and where it can be compared: not within a texel of the environment's poles,
     where Blender's own environment look-up reaches over to the other pole."""
     origin, one_plus_z, visible = map_of(scene, physics, frame).look_up(looking(scene, physics))
-    turned = origin @ physics.physics.reference.reference_render.rotation_matrix(ROTATION).T
+    turned = origin @ physics.physics.numerics.sphere.euler_rotation(ROTATION).T
     colors = physics.physics.reference.reference_render.sample_environment(environment_pixels(), turned)
     colors *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
     colors[~visible] = 0.0
@@ -174,7 +174,7 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
     directions = looking(scene, physics)
     mirrored = directions - 2.0 * (directions @ normal)[:, None] * normal
     origin, one_plus_z, visible = map_of(scene, physics).look_up(mirrored)
-    turned = origin @ physics.physics.reference.reference_render.rotation_matrix(ROTATION).T
+    turned = origin @ physics.physics.numerics.sphere.euler_rotation(ROTATION).T
     expected = physics.physics.reference.reference_render.sample_environment(environment_pixels(), turned)
     expected *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
     expected[~visible] = 0.0

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from physics.light.color import redshift_gain
-from physics.numerics.sphere import unit_vectors
-from physics.reference.reference_render import render, resize, rotation_matrix, sample_environment
+from physics.numerics.sphere import euler_rotation, unit_vectors
+from physics.reference.reference_render import render, resize, sample_environment
 
 FloatArray = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def test_euler_angles_are_applied_about_x_then_y_then_z() -> None:
     expected = vector
     for axis, angle in zip(np.eye(3), angles, strict=True):
         expected = rotated_by_axis_angle(expected, axis, angle)
-    np.testing.assert_allclose(rotation_matrix(angles) @ vector, expected, rtol=1e-13)
+    np.testing.assert_allclose(euler_rotation(angles) @ vector, expected, rtol=1e-13)
 
 
 def test_rotation_about_z_moves_the_sky_by_columns() -> None:
