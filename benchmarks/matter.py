@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 import physics
-from physics.matter.light_layer import render_matter
 from physics.matter.surface import Surface
 from physics.matter.thin_layer import thin_layer
 from physics.sampling.view import View
@@ -31,11 +30,13 @@ def lines(repeats: int) -> Iterator[str]:
         parameters = _shot(width, height, degrees)
         baked = physics.bake(parameters)
         covered = np.mean([each.coverage > 0.0 for each in baked.disk_passes]) * len(baked.disk_passes)
-        thin = _best(lambda baked=baked: render_matter(baked, film), repeats)
-        both = _best(lambda parameters=parameters: render_matter(physics.bake(parameters), film), repeats)
+        thin = _best(lambda baked=baked: _lit(baked, film), repeats)
+        both = _best(
+            lambda parameters=parameters: physics.render_matter(physics.LightParameters(parameters, film)), repeats
+        )
         yield f"  {width} x {height}, {100 * covered:.0f} % covered: thin {thin:.3f} s, with its bake {both:.3f} s"
     baked = physics.bake(_shot(480, 270, 10.0))
-    yield f"  480 x 270: thick {_best(lambda: render_matter(baked, thick), min(repeats, 2)):.2f} s"
+    yield f"  480 x 270: thick {_best(lambda: _lit(baked, thick), min(repeats, 2)):.2f} s"
     small, large = _shot(480, 270, 5.0), _shot(480 * FINER, 270 * FINER, 5.0)
     surface = Surface(film, physics.Disk(3, None, OUTER), SPIN)
     for number, (one, other) in enumerate(
@@ -54,6 +55,11 @@ def _shot(width: int, height: int, degrees: float) -> physics.WarpMapParameters:
     camera = physics.PerspectiveCamera.from_field_of_view(width, height, FIELD_OF_VIEW)
     disk = physics.Disk(3, None, OUTER)
     return physics.WarpMapParameters(SPIN, camera, place, physics.looking_at_hole(place), disk=disk)
+
+
+def _lit(baked: physics.WarpMap, look: physics.MatterLook) -> physics.LightLayer:
+    view = physics.WarpMapParameters.from_metadata(baked.metadata["parameters"])
+    return physics.render_matter(physics.LightParameters(view, look), physics.DiskPasses.of(baked))
 
 
 def _best(work: Callable[[], object], repeats: int) -> float:

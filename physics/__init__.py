@@ -37,7 +37,7 @@ from .files.light_layer_file import light_layer_path, read_light_layer, write_li
 from .files.map_check import Finding as MapFinding
 from .files.map_check import State as MapState
 from .files.map_check import check_map
-from .files.map_file import MapFormat
+from .files.map_file import MapFormat, MapOrigin
 from .files.star_file import FORMAT as STARS_FORMAT
 from .files.star_file import read_stars, stars_path, write_stars
 from .files.warp_map_file import FORMAT as WARP_MAP_FORMAT
@@ -104,6 +104,7 @@ from .light.sky_levels import MARGIN as SKY_LEVEL_MARGIN
 from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
 from .light.sky_settings import SKY_FILTER, SKY_SETTINGS
 from .light.star_sky import Stars, load_stars, star_sky
+from .maps.disk_passes import DiskPasses
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
 from .maps.footprint import footprint
 from .maps.lens import DEFAULT_SPHERE_RADIUS as DEFAULT_LENS_RADIUS
@@ -118,7 +119,7 @@ from .maps.world_map import STAMP as WORLD_MAP_STAMP
 from .maps.world_map import WorldMap
 from .maps.world_map import world_map_steps as bake_world_map_steps
 from .maps.world_map import world_parameters as world_map_parameters
-from .matter.light_layer import LightLayer, clock_rate, render_matter
+from .matter.light_layer import LightBaker, LightLayer, LightParameters, clock_rate, render_matter
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .numerics.work import drain
@@ -211,15 +212,19 @@ __all__ = [
     "DiskAccuracy",
     "DiskLook",
     "DiskPass",
+    "DiskPasses",
     "DiskResult",
     "ExitMap",
     "Fate",
     "ImageFileError",
     "LensNumbers",
+    "LightBaker",
     "LightLayer",
+    "LightParameters",
     "MapBaker",
     "MapFinding",
     "MapFormat",
+    "MapOrigin",
     "MapState",
     "MatterLook",
     "MatterPreset",

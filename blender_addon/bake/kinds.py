@@ -11,11 +11,13 @@ from ..core.session import SESSION, Life
 
 # What the maps of one bake or render have in common is kept here.
 _baker = SESSION.value(physics.MapBaker, Life.RENDER)
+_light_baker = SESSION.value(physics.LightBaker, Life.RENDER)
 
 
 def forget_shared_rays() -> None:
     """Free the memory of what maps have in common, when a bake or a render is over."""
     _baker.clear()
+    _light_baker.clear()
 
 
 def _warp_map_steps(parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WarpMap]":
@@ -47,6 +49,10 @@ class MapKind:
         return f"_{self.noun.partition(' ')[0]}_"
 
 
+def _light_steps(parameters: "physics.LightParameters") -> "Generator[float, None, physics.LightLayer]":
+    return (yield from _light_baker.now.steps(parameters))
+
+
 WARP_MAP = MapKind("warp map", physics.WARP_MAP_FORMAT, _warp_map_steps, physics.write_map_files, has_companions=True)
 EXIT_MAP = MapKind(
     "exit map", physics.EXIT_MAP_FORMAT, physics.bake_exit_map_steps, physics.write_exit_map, is_hashed=True
@@ -54,4 +60,7 @@ EXIT_MAP = MapKind(
 WORLD_MAP = MapKind(
     "world map", physics.WORLD_MAP_FORMAT, physics.bake_world_map_steps, physics.write_world_map, mark="world_"
 )
-KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP]
+LIGHT_LAYER = MapKind(
+    "layer of light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="light_"
+)
+KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER]

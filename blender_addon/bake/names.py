@@ -92,7 +92,7 @@ def file_name(
     size: tuple[int, int],
     frame: int,
     kind: MapKind,
-    parameters: "physics.WarpMapParameters | None" = None,
+    parameters: "physics.MapOrigin | None" = None,
 ) -> str:
     """Return a map's file name.
 

@@ -22,7 +22,7 @@ class MapRequest:
     frame: int
     path: Path
     kind: MapKind
-    parameters: "physics.WarpMapParameters"
+    parameters: "physics.MapOrigin"
     folder: MapFolder
     with_optional: bool = False
     """Whether files lie beside the map that can be made from it at any time, such as its footprints."""
@@ -31,7 +31,7 @@ class MapRequest:
         """Return all files of the request, the map first, with their formats; if wanted, of a map at another path."""
         place = self.path if path is None else path
         beside: tuple[tuple[Path, physics.MapFormat], ...] = ()
-        if self.kind.has_companions:
+        if self.kind.has_companions and isinstance(self.parameters, physics.WarpMapParameters):
             beside = physics.files_beside(place, self.parameters, optional=self.with_optional)
         return {place: self.kind.format, **dict(beside)}
 
@@ -71,9 +71,7 @@ class MapRequest:
         return f"the {self.kind.noun} of frame {self.frame}"
 
 
-def request(
-    scene: bpy.types.Scene, frame: FrameSetup, kind: MapKind, parameters: "physics.WarpMapParameters"
-) -> MapRequest:
+def request(scene: bpy.types.Scene, frame: FrameSetup, kind: MapKind, parameters: "physics.MapOrigin") -> MapRequest:
     """Return the request for a frame's map of one kind.
 
     Raises

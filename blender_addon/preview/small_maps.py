@@ -75,6 +75,10 @@ def requests_of(scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
         return []
 
 
-def _with_velocity_of_file(wanted: MapRequest) -> physics.WarpMapParameters:
+def _with_velocity_of_file(wanted: MapRequest) -> physics.MapOrigin:
     made = wanted.kind.format.read_metadata(wanted.path)["parameters"]
-    return replace(wanted.parameters, velocity=physics.WarpMapParameters.from_metadata(made).velocity)
+    velocity, origin = physics.WarpMapParameters.from_metadata(made).velocity, wanted.parameters
+    if isinstance(origin, physics.WarpMapParameters):
+        return replace(origin, velocity=velocity)
+    assert isinstance(origin, physics.LightParameters)
+    return replace(origin, view=replace(origin.view, velocity=velocity))

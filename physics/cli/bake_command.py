@@ -16,8 +16,9 @@ from ..files.light_layer_file import light_layer_path, write_light_layer
 from ..files.warp_map_file import write_warp_map
 from ..geodesics.tracer import DEFAULT_METHOD, DEFAULT_TOLERANCE, METHODS
 from ..images.exr import replacing
+from ..maps.disk_passes import DiskPasses
 from ..maps.warp_map import WarpMap, bake
-from ..matter.light_layer import clock_rate, render_matter
+from ..matter.light_layer import LightParameters, clock_rate, render_matter
 from ..numerics.errors import BlackHoleError
 from ..shot.cameras import Camera, PanoramaCamera, PerspectiveCamera
 from ..shot.map_parameters import (
@@ -133,7 +134,7 @@ def run(options: argparse.Namespace) -> None:
         look, moment = light
         if options.light_clock == "camera":
             moment /= clock_rate(parameters.spin, parameters.observer())
-        layer = render_matter(warp_map, look, moment)
+        layer = render_matter(LightParameters(parameters, look, moment), DiskPasses.of(warp_map))
     with contextlib.ExitStack() as together:  # all files or none, and the map, which counts, as the last
         map_file = together.enter_context(replacing(options.output))
         write_companions(

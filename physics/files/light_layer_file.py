@@ -3,17 +3,40 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
 from ..images.exr import PathLike
 from ..light.matter_settings import MatterLook
-from ..matter.light_layer import LightLayer, layer_hash
+from ..matter.light_layer import LightLayer, LightParameters, layer_hash
 from ..numerics.errors import BlackHoleError, WarpMapError
+from ..shot.map_parameters import WarpMapParameters
 from .companion import path_beside
-from .map_file import MapFormat, advice
+from .map_file import MapFormat, advice, made_from_view
+
+
+def _is_made_from(metadata: Mapping[str, Any], wanted: LightParameters) -> bool:
+    """Return whether a file was made from these parameters by this version, but for noise."""
+    if not made_from_view(metadata, wanted.view):
+        return False
+    made = _made_from(metadata)
+    return made is not None and wanted.agrees_with({"look": asdict(made.look), "time": made.time})
+
+
+def _made_from(metadata: Mapping[str, Any]) -> LightParameters | None:
+    """Return what a header says its layer is made from, or None if it is not one of this version, or damaged."""
+    try:
+        view = WarpMapParameters.from_metadata(metadata["parameters"])
+        made = LightParameters(view, MatterLook(**json.loads(metadata["umbraLook"])), float(metadata["umbraTime"]))
+        made.look.validate()
+    except (BlackHoleError, TypeError, ValueError):
+        return None
+    return made if metadata["umbraLayer"] == layer_hash(metadata["hash"], made.look, made.time) else None
+
 
 FORMAT = MapFormat(
     "umbra light",
@@ -21,6 +44,7 @@ FORMAT = MapFormat(
     "a layer of light",
     "R, G, B: light of the disk, linear Rec. 709, premultiplied; A: opacity, 1 less what passes of the light behind",
     attributes=("umbraLook", "umbraTime", "umbraLayer"),
+    is_made_from=_is_made_from,
 )
 
 
@@ -77,18 +101,13 @@ def read_light_layer(path: PathLike) -> LightLayer:
         If the file is missing, damaged, cut short, or not a layer of light; the message names it and says which.
     """
     (red, green, blue, opacity), metadata = FORMAT.read(path)
-    try:
-        look, time = json.loads(metadata.pop("umbraLook")), float(metadata.pop("umbraTime"))
-        made_from = MatterLook(**look)
-        made_from.validate()
-    except (BlackHoleError, TypeError, ValueError) as error:
-        raise WarpMapError(advice(f"{path} is damaged: its header cannot be read."), code="map.damaged") from error
-    stated = metadata.pop("umbraLayer")
+    made = _made_from(metadata)
     light = np.stack([red, green, blue], axis=-1).astype(np.float32)
     fits = np.isfinite(light).all() and (light >= 0.0).all() and ((opacity >= 0.0) & (opacity <= 1.0)).all()
-    if not fits or stated != layer_hash(metadata["hash"], made_from, time):
+    if not fits or made is None:
         raise WarpMapError(
             advice(f"{path} is damaged: it holds values that no layer of light has."), code="map.damaged"
         )
-    own = {**metadata, "look": dataclasses.asdict(made_from), "time": time, "layer_hash": stated}
+    own = {name: value for name, value in metadata.items() if name not in FORMAT.attributes}
+    own |= {"look": asdict(made.look), "time": made.time, "layer_hash": metadata["umbraLayer"]}
     return LightLayer(light, opacity.astype(np.float32), own)

@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
 
 from ..images.exr import PathLike, read_exr_header
 from ..images.exr_header import MAGIC
 from ..numerics.errors import ImageFileError, WarpMapError
-from ..shot.identity import hash_of
-from ..shot.map_parameters import WarpMapParameters
 from . import exit_map_file, light_layer_file, star_file, warp_map_file, world_map_file
 from .companions import COMPANIONS
-from .map_file import ATTRIBUTE_FORMAT, MapFormat
+from .map_file import ATTRIBUTE_FORMAT, MapFormat, MapOrigin
 
 # Readers that check every pixel, by the format that they read.
 READERS: dict[MapFormat, Callable[[PathLike], object]] = {
@@ -53,7 +50,7 @@ class Finding:
 
 
 def check_map(
-    path: PathLike, kind: MapFormat, wanted: WarpMapParameters | str | None = None, *, thorough: bool = True
+    path: PathLike, kind: MapFormat, wanted: MapOrigin | str | None = None, *, thorough: bool = True
 ) -> Finding:
     """Find out what a map's file is.
 
@@ -62,8 +59,8 @@ def check_map(
     path : path
     kind : MapFormat
         What the file should be.
-    wanted : WarpMapParameters or str, optional
-        What it should be made from, give or take the noise of single-precision arithmetic, or exactly this hash;
+    wanted : MapOrigin or str, optional
+        `WarpMapParameters`, or what a layer is made from: what it should be made from, give or take the noise of single-precision arithmetic, or exactly this hash;
         without it, any parameters will do.
     thorough : bool
         Whether to read and check the pixels too (some 0.1 s in full HD), and not only the header.
@@ -88,7 +85,11 @@ def check_map(
         if stamp != kind.stamp:
             return Finding(State.STALE, f"{path} is {kind.noun} of another version ({stamp})")
         metadata = kind.read_metadata(path)
-        if wanted is not None and not _is_made_from(metadata, wanted):
+        if isinstance(wanted, str):
+            fits = metadata["hash"] == wanted
+        else:
+            fits = wanted is None or kind.is_made_from(metadata, wanted)
+        if not fits:
             return Finding(State.STALE, f"The {noun} {path} is out of date")
         if thorough:
             READERS[kind](path)
@@ -99,16 +100,6 @@ def check_map(
     except OSError as error:
         return Finding(State.DAMAGED, f"Cannot read {path}: {(error.strerror or str(error)).lower()}")
     return Finding(State.VALID)
-
-
-def _is_made_from(metadata: Mapping[str, Any], wanted: WarpMapParameters | str) -> bool:
-    """Whether a map is one of this version, made from these parameters."""
-    if isinstance(wanted, str):
-        return bool(metadata["hash"] == wanted)
-    if metadata["hash"] == wanted.hash:
-        return True
-    made = metadata["parameters"]
-    return bool(metadata["hash"] == hash_of(made)) and wanted.agrees_with(made)
 
 
 def stamp_kind(stamp: object) -> MapFormat | None:

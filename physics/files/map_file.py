@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..images.exr import PathLike, read_channels, read_exr_header, write_channels
 from ..numerics.errors import ImageFileError, WarpMapError
-from ..shot.identity import bake_version, version_of
+from ..shot.identity import bake_version, hash_of, version_of
 from ..shot.map_parameters import WarpMapParameters
 
 CHANNELS = ("R", "G", "B", "A")
@@ -34,6 +34,33 @@ _UNSEALED = (ATTRIBUTE_SEAL, ATTRIBUTE_CHECKSUM)
 Planes = Sequence[NDArray[Any]]
 
 
+class MapOrigin(Protocol):
+    """What a file should be made from: `WarpMapParameters`, or what a layer is made from."""
+
+    @property
+    def hash(self) -> str:
+        """The hash of all of it."""
+
+    @property
+    def map_size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+
+
+def made_from_view(metadata: Mapping[str, Any], wanted: WarpMapParameters) -> bool:
+    """Return whether a file was made from these parameters, but for the noise of single-precision arithmetic.
+
+    Parameters
+    ----------
+    metadata : mapping
+        ``hash`` and ``parameters`` of the file.
+    wanted : WarpMapParameters
+    """
+    if metadata["hash"] == wanted.hash:
+        return True
+    made = metadata["parameters"]
+    return bool(metadata["hash"] == hash_of(made)) and wanted.agrees_with(made)
+
+
 @dataclass(frozen=True)
 class MapFormat:
     """One kind of map file."""
@@ -49,6 +76,8 @@ class MapFormat:
     """Pictures of the map's size that the file holds, one below the other."""
     attributes: tuple[str, ...] = ()
     """Further header attributes, strings, that the kind has."""
+    is_made_from: Callable[[Mapping[str, Any], Any], bool] = made_from_view
+    """Whether metadata are those of a file of this version that was made from given parameters."""
 
     @property
     def stamp(self) -> str:

@@ -68,7 +68,7 @@ class MatterLook:
         unit="K",
         subtype="COLOR_TEMPERATURE",
     )
-    light: str = _choice(
+    band: str = _choice(
         "Light",
         "Which light the brightness counts",
         Choice(VISIBLE, "VISIBLE", 0, "Visible", "The light that an eye sees, as the sky's", 0.0),

@@ -76,20 +76,14 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     Returns
     -------
     WarpMap or None
-        None unless everything but the azimuth and the hole's orientation agrees to within half of the
-        interpolation error that the parameters allow, which for `interpolation` 0 means exactly, and to a hundredth of
-        a pixel, so that a slow pan of a long lens is not taken for a standstill. Directions are as
-        good as the earlier map's, visibility and redshift are its own, and a disk's passes too but for their azimuth.
-        To keep errors from adding up over many frames, always turn the same map.
+        None where `turn_between` finds no turn. Directions are as good as the earlier map's, visibility and redshift
+        are its own, and a disk's passes too but for their azimuth. To keep errors from adding up over many frames,
+        always turn the same map.
     """
     before = WarpMapParameters.from_metadata(earlier.metadata["parameters"])
-    if _without_place(before) != _without_place(parameters):
+    azimuth = turn_between(before, parameters)
+    if azimuth is None:
         return None
-    old, new = _Place(before), _Place(parameters)
-    allowed = min(0.5 * parameters.interpolation, PIXEL_SHARE * parameters.pixel_angle)
-    if not old.sees_the_same_as(new, allowed):
-        return None
-    azimuth = new.phi - old.phi
     about_axis = np.array(
         [
             [math.cos(azimuth), -math.sin(azimuth), 0.0],
@@ -103,6 +97,27 @@ def turned_map(earlier: WarpMap, parameters: WarpMapParameters) -> WarpMap | Non
     turned = _rotated(earlier, rotation, metadata)
     passes = tuple(turned_pass(each, azimuth, metadata) for each in earlier.disk_passes)
     return dataclasses.replace(turned, disk_passes=passes)
+
+
+def turn_between(before: WarpMapParameters, after: WarpMapParameters) -> float | None:
+    """Return by how much the camera's azimuth is larger, radians, where nothing else tells two frames apart.
+
+    Parameters
+    ----------
+    before, after : WarpMapParameters
+
+    Returns
+    -------
+    float or None
+        None unless everything but the azimuth and the hole's orientation agrees to within half of the
+        interpolation error that the parameters allow, which for `interpolation` 0 means exactly, and to a hundredth of
+        a pixel, so that a slow pan of a long lens is not taken for a standstill.
+    """
+    if _without_place(before) != _without_place(after):
+        return None
+    old, new = _Place(before), _Place(after)
+    allowed = min(0.5 * after.interpolation, PIXEL_SHARE * after.pixel_angle)
+    return new.phi - old.phi if old.sees_the_same_as(new, allowed) else None
 
 
 def turned_pass(earlier: DiskPass, azimuth: float, metadata: dict[str, object]) -> DiskPass:

@@ -81,7 +81,7 @@ class Surface:
         zero = math.log(look.temperature)
         self._bright = (zero + 0.25 * look.falloff * flux).astype(np.float32)
         self._tint = (zero + 0.25 * look.color_variation * flux).astype(np.float32)
-        by_band = 0.75 if look.light == MONOCHROMATIC else 1.0
+        by_band = 0.75 if look.band == MONOCHROMATIC else 1.0
         self._bright_power = np.float32(look.doppler_brightness * by_band)
         self._tint_power = np.float32(look.doppler_color)
         self._is_one = look.falloff == look.color_variation and self._bright_power == self._tint_power
@@ -151,7 +151,7 @@ class Surface:
             tint = self.radial(self._tint, log_radius) + heat
             tint += log_g * self._tint_power
         light: Image = self._colors.take(_place(tint), axis=0)
-        power = np.float32(WIEN) * np.exp(-bright) if self.look.light == VISIBLE else np.float32(BOLOMETRIC_POWER)
+        power = np.float32(WIEN) * np.exp(-bright) if self.look.band == VISIBLE else np.float32(BOLOMETRIC_POWER)
         gain = np.exp(np.minimum(np.float32(0.5) * power * power * lost, np.float32(MOST_LOST_GAIN)))
         gain *= self._luminance.take(_place(bright))
         light *= gain[:, None]
@@ -219,7 +219,7 @@ def _flux(look: MatterLook, disk: Disk, spin: float, radius: Array, inner: float
 def _tables(look: MatterLook) -> tuple[Image, Image]:
     """Return brightness, exposure included, and colors of luminance 1, shape (n, 4), by ln T."""
     kelvin = np.exp(_LOGS)
-    if look.light == VISIBLE:
+    if look.band == VISIBLE:
         bright = black_body.luminance(kelvin) / black_body.luminance(look.temperature)
     else:
         bright = (kelvin / look.temperature) ** BOLOMETRIC_POWER

@@ -14,6 +14,7 @@ higher where the gas is denser: surfaces of clouds hide each other. Matter above
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 
 import numpy as np
 
@@ -45,10 +46,12 @@ LARGEST_STEP = 3.0
 _TURN = 2.0 * math.pi
 
 
-def thick_layer(
+def thick_layer_steps(
     surface: Surface, view: View, size: tuple[int, int], disk: Disk, spin: float, time: float, nodes: int = NODES
-) -> tuple[Image, int]:
+) -> Generator[float, None, tuple[Image, int]]:
     """Return premultiplied light and what passes through, shape (height, width, 4), and how many rays are unresolved.
+
+    Yields the fraction done, 0 to 1, after each few rows of pixels.
 
     Parameters
     ----------
@@ -80,6 +83,7 @@ def thick_layer(
             chosen, low, high = paths.passes(order, *disk.radii(spin))
             if len(chosen):
                 _add_pass(surface, paths, (chosen, low, high), part, columns, disk, spin, time, nodes)
+        yield min(1.0, (start + ROWS) / rows)
     return layer.reshape(rows, columns, 4), unresolved
 
 

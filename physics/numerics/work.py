@@ -46,3 +46,22 @@ def drain(
             return result
         if progress is not None:
             progress(fraction)
+
+
+def share_of(steps: Generator[float, None, Result], low: float, high: float) -> Generator[float, None, Result]:
+    """Run a generator of fractions as a part of longer work, which it takes from `low` to `high`.
+
+    Parameters
+    ----------
+    steps : generator
+        Yields the fraction done, 0 to 1, and returns the result.
+    low, high : float
+        Fractions of the longer work.
+    """
+    while True:
+        try:
+            fraction = next(steps)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
+        yield low + (high - low) * fraction

@@ -87,8 +87,8 @@ def agree(made: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
         return False
     place = wanted["camera_position"]
     distance = max(1.0, *(abs(each) for each in place))
-    return _alike(made["camera_position"], place, distance) and all(
-        made[name] == value if name in _EXACT else _alike(made[name], value)
+    return alike(made["camera_position"], place, distance) and all(
+        made[name] == value if name in _EXACT else alike(made[name], value)
         for name, value in wanted.items()
         if name != "camera_position"
     )
@@ -108,19 +108,28 @@ def _rounded(value: Any, decimals: int | None) -> Any:
     return round(value, decimals) + 0.0
 
 
-def _alike(made: Any, wanted: Any, scale: float = 1.0) -> bool:
-    """Compare plain JSON values: numbers within the noise of numbers of this size or their own, all else exactly."""
+def alike(made: Any, wanted: Any, scale: float = 1.0) -> bool:
+    """Return whether two plain JSON values agree: numbers within the noise of numbers of a size, or of their own, all
+    else exactly.
+
+    Parameters
+    ----------
+    made, wanted : object
+        Plain JSON values.
+    scale : float
+        The size of numbers whose noise is allowed.
+    """
     if isinstance(wanted, Mapping):
         return (
             isinstance(made, Mapping)
             and made.keys() == wanted.keys()
-            and all(_alike(made[key], each) for key, each in wanted.items())
+            and all(alike(made[key], each) for key, each in wanted.items())
         )
     if isinstance(wanted, list):
         return (
             isinstance(made, list)
             and len(made) == len(wanted)
-            and all(_alike(one, other, scale) for one, other in zip(made, wanted, strict=True))
+            and all(alike(one, other, scale) for one, other in zip(made, wanted, strict=True))
         )
     if isinstance(wanted, float) and isinstance(made, (int, float)) and not isinstance(made, bool):
         return abs(made - wanted) <= NOISE * max(scale, abs(wanted))

@@ -5,11 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from test_thin_layer import shot
+from test_thin_layer import rendered, shot
 
 import physics
 from physics.light.matter_settings import MATTER_PRESETS, MatterLook
-from physics.matter.light_layer import render_matter
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +19,7 @@ def views():
 @pytest.mark.parametrize("name", MATTER_PRESETS)
 def test_looks_are_within_the_screen_and_have_more_than_one_hue(views, name):
     for view in views:
-        layer = render_matter(view, MATTER_PRESETS[name])
+        layer = rendered(view, MATTER_PRESETS[name])
         seen = layer.opacity > 0.05
         light = layer.light[seen]
         assert (light.max(axis=1) > 1.0).mean() <= 0.03
@@ -36,9 +35,9 @@ def test_a_hot_spot_comes_round_in_its_orbit(views):
     look = MatterLook(strands=0.0, smoke=0.0, spots=1, spot_radius=9.0, spot_size=0.15)
     none = MatterLook(strands=0.0, smoke=0.0)
     period = 2.0 * math.pi * (9.0**1.5 + 0.9)
-    plain = render_matter(views[1], none).light
+    plain = rendered(views[1], none).light
     start, half, whole = (
-        np.abs(render_matter(views[1], look, share * period).light - plain).sum(axis=2) for share in (0.0, 0.5, 1.0)
+        np.abs(rendered(views[1], look, share * period).light - plain).sum(axis=2) for share in (0.0, 0.5, 1.0)
     )
     np.testing.assert_allclose(whole, start, atol=1e-3 * start.max())
     assert np.minimum(start, half).sum() < 0.1 * start.sum()
@@ -49,11 +48,11 @@ def test_gaps_and_infalling_gas():
     baked = physics.bake(bare)
     radius, covered = baked.disk_passes[0].radius, baked.disk_passes[0].coverage == 1.0
     look = MatterLook(strands=0.0, smoke=0.0, gap_radius=10.0, gap_width=0.1, gap_depth=1.0)
-    opacity = render_matter(baked, look).opacity
+    opacity = rendered(baked, look).opacity
     assert opacity[covered & (np.abs(radius - 10.0) < 0.2)].max() < 0.05
     assert opacity[covered & (np.abs(radius - 7.0) < 0.5)].min() > 0.7
     isco = physics.isco_radius(0.9)
     within = covered & (radius < 0.95 * isco)
     looks = [MatterLook(strands=0.0, smoke=0.0, infall=amount) for amount in (0.0, 1.0)]
-    dark, lit = (render_matter(baked, look).light[within].sum() for look in looks)
+    dark, lit = (rendered(baked, look).light[within].sum() for look in looks)
     assert lit > 10.0 * dark

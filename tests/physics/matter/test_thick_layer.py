@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from test_thin_layer import SPIN, shot
+from test_thin_layer import SPIN, rendered, shot
 
 import physics
 from physics.kerr.rays import camera_triad
 from physics.light.matter_settings import MATTER_PRESETS, MatterLook
-from physics.matter.light_layer import render_matter
 from physics.matter.surface import Surface
 from physics.matter.thick_layer import HIGHEST, profile
 from physics.matter.thick_paths import LayerPaths
@@ -64,7 +63,7 @@ def test_a_layer_of_no_height_is_the_thin_disk():
     parameters = shot(160, 90, 20.0)
     baked = physics.bake(parameters)
     thin = thin_layer(Surface(PLAIN, parameters.disk, SPIN), baked.disk_passes, View(parameters), 0.0, filtered=False)
-    thick = render_matter(baked, dataclasses.replace(PLAIN, thickness=0.001))
+    thick = rendered(baked, dataclasses.replace(PLAIN, thickness=0.001))
     whole = np.logical_and.reduce([(each.coverage == 1.0) | (each.coverage == 0.0) for each in baked.disk_passes])
     whole &= baked.disk_passes[0].coverage == 1.0
     error = np.abs(thick.light - thin[..., :3])[whole].sum() / thin[..., :3][whole].sum()
@@ -82,15 +81,15 @@ def test_light_is_steady_while_the_camera_crosses_the_plane_inside_the_layer():
         place = (12.0 * math.cos(angle), 0.0, 12.0 * math.sin(angle))
         looking = physics.looking_at_hole(place)
         parameters = dataclasses.replace(shot(96, 54, 0.0), camera_position=place, camera_to_hole=looking)
-        total.append(float(render_matter(physics.bake(parameters), look).light.sum()))
+        total.append(float(rendered(physics.bake(parameters), look).light.sum()))
     assert total[1] == pytest.approx(total[0], rel=0.01)
     assert total[1] == pytest.approx(total[2], rel=0.01)
 
 
 def test_the_torus_is_thick_and_counts_what_it_leaves_out():
     baked = physics.bake(shot(96, 54, 5.0))
-    layer = render_matter(baked, MATTER_PRESETS["torus"])
-    thin = render_matter(baked, dataclasses.replace(MATTER_PRESETS["torus"], thickness=0.0))
+    layer = rendered(baked, MATTER_PRESETS["torus"])
+    thin = rendered(baked, dataclasses.replace(MATTER_PRESETS["torus"], thickness=0.0))
     assert (layer.opacity > 0.5).sum() > 1.3 * (thin.opacity > 0.5).sum()
     assert np.isfinite(layer.light).all()
-    assert 0 <= layer.metadata["counts"]["light_unresolved"] < 0.01 * layer.opacity.size
+    assert 0 <= layer.counts["unresolved"] < 0.01 * layer.opacity.size

@@ -12,7 +12,7 @@ from physics.kerr.metric import isco_radius
 from physics.light import black_body
 from physics.light.matter_settings import BOLOMETRIC, MONOCHROMATIC, MatterLook
 from physics.matter.delays import delays
-from physics.matter.light_layer import clock_rate, render_matter
+from physics.matter.light_layer import clock_rate
 from physics.matter.rings import TurningRings
 from physics.matter.surface import Surface, opacity
 from physics.matter.thin_layer import slants, thin_layer
@@ -22,6 +22,12 @@ from physics.sampling.view import View
 SPIN = 0.9
 PLAIN = MatterLook(strands=0.0, smoke=0.0, inner_softness=0.0, outer_softness=0.0)
 FILM = MatterLook(profile="power_law", exponent=1.5, temperature=4500.0, doppler_color=0.15, doppler_brightness=0.15)
+
+
+def rendered(baked, look, time=0.0):
+    """Return the layer of a baked map."""
+    view = physics.WarpMapParameters.from_metadata(baked.metadata["parameters"])
+    return physics.render_matter(physics.LightParameters(view, look, time), physics.DiskPasses.of(baked))
 
 
 def shot(width, height, degrees, **changes):
@@ -69,7 +75,7 @@ def test_light_is_that_of_shifted_black_bodies():
         (BOLOMETRIC, flux * g**4),
         (MONOCHROMATIC, flux * g**3),
     ):
-        surface = Surface(dataclasses.replace(PLAIN, light=light), disk, SPIN)
+        surface = Surface(dataclasses.replace(PLAIN, band=light), disk, SPIN)
         levels = surface.levels(none, none)
         found, depth, _ = surface.emission(log_r, none, np.log(g).astype(np.float32), 0.0, None, levels)
         assert found[:, :3] @ black_body.LUMINANCE_WEIGHTS == pytest.approx(wanted, rel=0.02)
@@ -171,9 +177,9 @@ def test_clocks_of_cameras():
 def test_impossible_layers_are_refused():
     without = physics.bake(shot(16, 9, 10.0, disk=None))
     with pytest.raises(physics.BlackHoleError, match="without a disk"):
-        render_matter(without, MatterLook())
+        rendered(without, MatterLook())
     with_disk = physics.bake(shot(16, 9, 10.0))
     with pytest.raises(physics.BlackHoleError, match="depth is -1"):
-        render_matter(with_disk, MatterLook(depth=-1.0))
+        rendered(with_disk, MatterLook(depth=-1.0))
     with pytest.raises(physics.BlackHoleError, match="time of the disk"):
-        render_matter(with_disk, MatterLook(), math.nan)
+        rendered(with_disk, MatterLook(), math.nan)
