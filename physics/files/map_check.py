@@ -60,8 +60,8 @@ def check_map(
     kind : MapFormat
         What the file should be.
     wanted : MapOrigin or str, optional
-        `WarpMapParameters`, or what a layer is made from: what it should be made from, give or take the noise of single-precision arithmetic, or exactly this hash;
-        without it, any parameters will do.
+        `WarpMapParameters`, or what a layer is made from: it should be made from this, give or take the noise of
+        single-precision arithmetic, or have exactly this hash. Without it, any parameters will do.
     thorough : bool
         Whether to read and check the pixels too (some 0.1 s in full HD), and not only the header.
 
