@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import bpy
 
-from ..bake import baking, cache
+from ..bake import baking, cache, star_sky
 from ..bake.request import MapRequest
 from ..core.errors import SceneError
 from ..core.physics_api import physics
@@ -108,6 +108,7 @@ def _bake(uid: int, frames: list[int], requests: baking.RequestsAt) -> Generator
     try:
         summary = yield from baking.bake_frames(frames, requests)
         if scene is not None:
+            star_sky.provide(scene, may_write=True)
             registry.of(scene).prepare_files(scene, may_bake=True)
     except physics.BlackHoleError:
         _show_baked(uid)  # those of the other frames

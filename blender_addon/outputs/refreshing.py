@@ -3,8 +3,10 @@
 
 import bpy
 
+from ..bake import star_sky
 from ..core import messages
 from ..core.errors import SceneError
+from ..core.physics_api import physics
 from ..scene import frame_setup
 from . import registry
 from .shared import disk_light
@@ -15,8 +17,16 @@ def refresh(owner: bpy.types.ID) -> None:
     if isinstance(owner, bpy.types.Scene):
         output = registry.of(owner)
         if owner.library is None:
+            _provide_stars(owner)
             output.prepare(owner)
         output.refresh(owner)
+
+
+def _provide_stars(scene: bpy.types.Scene) -> None:
+    try:
+        star_sky.provide(scene, may_write=True)
+    except physics.BlackHoleError as error:
+        messages.warn(error.for_user())
 
 
 def refresh_disk(scene: bpy.types.Scene) -> None:

@@ -7,15 +7,17 @@ they begin with (`map_names`), so that they can be found when one of the three i
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
-from ..bake import reuse
+from ..bake import reuse, star_sky
 from ..bake.folder import being_saved_as, explain, folder
 from ..bake.names import former_shot_name, name_pattern, shot_name
 from ..core import messages
+from ..core.physics_api import physics
 from ..core.session import SESSION, Life, PerScene
 from ..scene import frame_setup
 from . import registry
@@ -37,6 +39,8 @@ _saving: PerScene[_Saving | None] = SESSION.per_scene(lambda: None, Life.FILE)
 def before(blend: Path) -> None:
     """Let all scenes refer to the maps as the file will find them that is about to be saved, and carry those there."""
     for scene in bpy.data.scenes:
+        with being_saved_as(blend):
+            _keep_stars(scene)
         output = registry.of(scene)
         if scene.library is not None or not output.is_set_up(scene):
             continue
@@ -45,6 +49,14 @@ def before(blend: Path) -> None:
             _carry_to(scene, hole.name, blend)
         with being_saved_as(blend):
             output.point_at_files(scene)
+
+
+def _keep_stars(scene: bpy.types.Scene) -> None:
+    """Have the built-in sky beside the scene's maps."""
+    try:
+        star_sky.provide(scene, may_write=True)
+    except physics.BlackHoleError as error:
+        messages.warn(error.for_user())
 
 
 def _carry_to(scene: bpy.types.Scene, hole_name: str, blend: Path) -> None:
@@ -70,6 +82,8 @@ def after(blend: Path) -> None:
     """The file is saved: remove names that nobody needs any more; after a copy, be the open file again."""
     is_copy = blend != Path(bpy.data.filepath)
     kept = {each.new for _scene, each in _saving.items() if each is not None}
+    for scene in bpy.data.scenes:
+        _keep_stars(scene)
     for scene, saving in _saving.items():
         if saving is None:
             continue
@@ -95,6 +109,8 @@ def _remove(source: Path, old: str, target: Path, new: str) -> None:
 
 def on_load(scene: bpy.types.Scene) -> None:
     """Carry the maps of a file that was opened to its names, where it was renamed or is of version 0.1.0."""
+    with contextlib.suppress(physics.BlackHoleError):  # a render makes the sky, or says why not
+        star_sky.provide(scene, may_write=False)
     hole = frame_setup.find_active_hole(scene)
     if hole is None or not registry.of(scene).is_set_up(scene):
         return

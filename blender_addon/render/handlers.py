@@ -18,7 +18,7 @@ from typing import TypeVar
 
 import bpy
 
-from ..bake import baking, check
+from ..bake import baking, check, star_sky
 from ..core import messages
 from ..core.blender_version import SCENE_OWNS_COMPOSITOR
 from ..core.errors import SceneError, unexpected
@@ -115,6 +115,7 @@ def on_render_init(scene: bpy.types.Scene, _unused: object = None) -> None:
     if len(frame_setup.holes(scene)) > 1:
         messages.warn(f'scene "{scene.name}" contains several black holes; only the active one is rendered.')
     now.is_running, now.name = True, scene.name
+    _guarded(lambda each: star_sky.provide(each, may_write=each.umbra.auto_bake), scene)
     if frame_setup.holes(scene):
         _guarded(output.begin_render, scene)
     _guarded(refreshing.refresh_disk, scene)

@@ -3,12 +3,12 @@
 
 import bpy
 
+from ..bake import star_sky
 from ..core.physics_api import physics
 from ..outputs import registry, switching
 from ..outputs.compositor.output import CompositorOutput
 from ..outputs.lens import foreground
 from ..scene import frame_setup
-from ..scene.sky import environment
 from ..settings import output_choice
 from ..settings.hole_properties import DEFAULT_MASS_SCALE, LARGEST_SPIN
 from . import engines
@@ -137,13 +137,13 @@ class UMBRA_OT_remove_compositor(bpy.types.Operator):
 class UMBRA_OT_use_star_sky(bpy.types.Operator):
     bl_idname = "umbra.use_star_sky"
     bl_label = "Sky of Real Stars"
-    bl_description = "Use the built-in sky: the real stars and the glow of the Milky Way, packed into this file"
+    bl_description = "Use the built-in sky: the real stars and the Milky Way, in a file beside the warp maps"
     bl_options = {"REGISTER", "UNDO"}
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.umbra
-        settings.environment_image = environment.load_star_sky()
+        settings.environment_image = star_sky.load(context.scene)
         settings.environment_source = "IMAGE"
         registry.of(context.scene).brighten_stars(context.scene)
         return {"FINISHED"}

@@ -3,6 +3,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import bpy
@@ -302,8 +303,8 @@ def test_the_default_world_brings_the_real_stars(
     image = scene.umbra.environment_image
     assert scene.umbra.environment_source == "IMAGE"
     assert tuple(image.size) == (4096, 2048)
-    assert image.packed_file is not None
-    assert image.filepath.startswith("//")
+    assert image.packed_file is None
+    assert Path(image.filepath).parent == Path(bpy.app.tempdir, "umbra_maps")  # beside maps of a file not saved yet
     assert math.isclose(image.pixels[3], 1.0)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import bpy
 
+from ...bake import star_sky
 from ...bake.kinds import WARP_MAP
 from ...bake.request import MapRequest, request
 from ...core import messages
@@ -127,6 +128,7 @@ class CompositorOutput(Output):
             if is_new_here:
                 scene.umbra.hide_behind = True
             return notes
+        star_sky.provide(scene, may_write=True)
         return _prepare(scene) + compositing.set_up(scene) + _alpha_note(scene)
 
     def can_be_removed(self, scene: bpy.types.Scene) -> bool:
@@ -157,7 +159,7 @@ class CompositorOutput(Output):
             except SceneError as error:
                 stars = settings.environment_image is None
                 if error.code in environment.NO_SKY:
-                    settings.environment_image = settings.environment_image or environment.load_star_sky()
+                    settings.environment_image = settings.environment_image or star_sky.load(scene)
                     settings.environment_source = "IMAGE"
                 else:
                     notes = _leave_world(scene, error)
@@ -316,7 +318,7 @@ class CompositorOutput(Output):
 
 def _leave_world(scene: bpy.types.Scene, error: SceneError) -> list[str]:
     """Choose an image in place of a World that cannot be the sky, and say why."""
-    environment.leave_world(scene)
+    environment.leave_world(scene, scene.umbra.environment_image or star_sky.load(scene))
     return [f"The World is not the sky of the black hole. {error.for_user()}"]
 
 

@@ -52,7 +52,7 @@ class WorldOutput(Output):
             node = lensed_world.install(scene)
         except SceneError:
             if has_taken:
-                environment.leave_world(scene)
+                environment.leave_world(scene, scene.umbra.environment_image)
             raise
         if has_taken:  # what the stars were brightened by
             look = look | {EXPOSURE: 0.0}

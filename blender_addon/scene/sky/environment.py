@@ -3,17 +3,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 from mathutils import Euler
 
-from ...core import color_spaces
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
-from ...core.physics_api import PACKAGE, physics
 from . import followed, panorama, sky_alpha, sky_frames, world_digest
 from .node_paths import SHINING, Place, source, world_output
 
@@ -21,8 +17,6 @@ from .node_paths import SHINING, Place, source, world_output
 WORLD_BEFORE = "umbra_world_before"
 
 STAR_SKY_NAME = "Umbra Star Sky"
-STAR_SKY_HEIGHT = 2048
-_STAR_SKY_FILE = f"star_sky_{STAR_SKY_HEIGHT}_2.exr"  # the number is raised whenever the picture changes
 
 # Codes of Worlds that show no picture of a sky.
 NO_SKY = frozenset({"sky.plain-color", "sky.no-world"})
@@ -260,11 +254,11 @@ def world_left_out(scene: bpy.types.Scene) -> str | None:
 _LEFT_OUT = "umbra_world_left_out"
 
 
-def leave_world(scene: bpy.types.Scene) -> None:
-    """Choose an image as the sky, of the stars if there is none, in place of a World that no image can show."""
+def leave_world(scene: bpy.types.Scene, image: bpy.types.Image | None) -> None:
+    """Choose an image as the sky, in place of a World that no image can show."""
     settings = scene.umbra
     scene[_LEFT_OUT] = True
-    settings.environment_image = settings.environment_image or load_star_sky()
+    settings.environment_image = image
     settings.environment_source = "IMAGE"
 
 
@@ -343,46 +337,8 @@ def check_image(image: bpy.types.Image) -> None:
         raise sky_frames.image_missing(image)
 
 
-# --- the built-in sky -----------------------------------------------------------------------------
-
-
-def _cache_folder() -> Path:
-    """Where the built-in sky is kept between sessions."""
-    try:
-        return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
-    except ValueError:  # not installed as an extension
-        return Path(bpy.app.tempdir)
-
+# --- the built-in sky, which `bake.star_sky` makes --------------------------------------------------
 
 # Stops by which the star sky is brightened when it is chosen. Its values are those of a photograph of a dark night,
 # in which the stars would be dim points beside anything lit in the scene.
 STAR_SKY_EXPOSURE = 2.5
-
-
-def load_star_sky() -> bpy.types.Image:
-    """The built-in sky of real stars, packed into the file so that the file needs nothing else.
-
-    It is computed once and kept in the extension's own folder.
-
-    Raises
-    ------
-    physics.BlackHoleError
-        That folder cannot be written to.
-    """
-    image = bpy.data.images.get(STAR_SKY_NAME)
-    if image is not None and image.packed_file is not None:
-        return image
-    path = _cache_folder() / _STAR_SKY_FILE
-    if not path.is_file():
-        pixels = physics.star_sky(STAR_SKY_HEIGHT)
-        physics.write_exr(path, np.minimum(pixels, np.finfo(np.float16).max).astype(np.float16))
-    image = bpy.data.images.load(str(path))
-    image.name = STAR_SKY_NAME
-    if not color_spaces.mark_as_linear_rec709(image):
-        print("Umbra: the color configuration has no linear Rec.709, in which the stars are given", flush=True)
-    image.pack()
-    # no path of this computer in a file that may be passed on
-    image.filepath_raw = f"//{_STAR_SKY_FILE}"
-    for packed in image.packed_files:
-        packed.filepath = image.filepath_raw
-    return image

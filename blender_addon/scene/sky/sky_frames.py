@@ -12,6 +12,9 @@ import bpy
 
 from ...core.errors import SceneError
 
+BUILT_IN = "umbra_built_in_sky"
+"""Custom property of an image that this add-on makes: the name of its file."""
+
 SETTINGS = ("frame_duration", "frame_start", "frame_offset", "use_cyclic")
 
 # The last run of digits before a file's extension.
@@ -38,6 +41,11 @@ def is_packed(image: bpy.types.Image) -> bool:
     return image.source == "GENERATED" or image.packed_file is not None or len(image.packed_files) > 0
 
 
+def is_built_in(image: bpy.types.Image) -> bool:
+    """Return whether an image is a file that this add-on makes."""
+    return BUILT_IN in image and not is_packed(image)
+
+
 def tiled(image: bpy.types.Image) -> SceneError:
     """Return the refusal of an image of UDIM tiles."""
     return SceneError(
@@ -49,6 +57,12 @@ def tiled(image: bpy.types.Image) -> SceneError:
 
 def image_missing(image: bpy.types.Image) -> SceneError:
     """Return the refusal of an image without its file."""
+    if is_built_in(image):
+        return SceneError(
+            f"The built-in sky is missing ({path_of(image)}): press Sky of Real Stars or Update Compositor in the "
+            "Umbra panel, or render with Bake When Rendering, which make it.",
+            code="sky.stars-missing",
+        )
     return SceneError(
         f'The sky image "{image.name}" cannot be loaded from {path_of(image)}: choose a file that exists.',
         code="sky.image-missing",
