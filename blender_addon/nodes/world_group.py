@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shader node group "Umbra World": its sockets and its version.
 
-Its Vector replaces Texture Coordinate > Generated as the input of the World's sky; the sky's color is multiplied by its
-Tint, and its Fault is added. Each lensed World has a group of its own, because the map is read inside the group.
+Its Vector replaces Texture Coordinate > Generated as the input of the World's sky; the sky's color passes by the group
+"Umbra World Tint" (`world_tint`), which its Shift and Light feed. Each lensed World has a group of its own, because the
+map is read inside the group.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
-from . import black_hole_group, world_nodes
+from . import black_hole_group, world_nodes, world_tint
 from .builder import TreeBuilder
 from .versioned_group import SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra World"
-GROUP_VERSION = 3
+GROUP_VERSION = 4
 VERSION_KEY = "umbra_world_version"
 
 LENSING = SocketSpec(
@@ -39,12 +42,11 @@ OTHER_RAYS = SocketSpec(
 VECTOR = SocketSpec(
     "Vector", "NodeSocketVector", "Where the light comes from: in place of Generated coordinates", in_out="OUTPUT"
 )
-TINT = SocketSpec(
-    "Tint", "NodeSocketVector", "What the sky's color is multiplied by: redshift, exposure, shadow", in_out="OUTPUT"
-)
-FAULT = SocketSpec(
-    "Fault", "NodeSocketVector", "What is added to the sky's color: magenta without a valid map", in_out="OUTPUT"
-)
+SHIFT = replace(world_tint.SHIFT, default=None, hide_value=False, in_out="OUTPUT")
+LIGHT = replace(world_tint.LIGHT, default=None, hide_value=False, in_out="OUTPUT")
+
+FORMER_OUTPUTS = {"Tint": SHIFT.name, "Fault": LIGHT.name}
+"""Names of the outputs of versions 1 to 3 that fed what stands before a Background -> those of now."""
 
 INPUTS = (
     LENSING,
@@ -54,7 +56,7 @@ INPUTS = (
     black_hole_group.REDSHIFT_BRIGHTNESS,
     black_hole_group.TEMPERATURE,
 )
-OUTPUTS = (VECTOR, TINT, FAULT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
+OUTPUTS = (VECTOR, SHIFT, LIGHT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
 
 
 def _build(builder: TreeBuilder, values: Values) -> Values:
@@ -69,8 +71,8 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
     results = world_nodes.build(builder, inputs)
     return {
         VECTOR.name: results.vector,
-        TINT.name: results.tint,
-        FAULT.name: results.fault,
+        SHIFT.name: results.shift,
+        LIGHT.name: results.light,
         black_hole_group.SHADOW.name: results.shadow,
         black_hole_group.REDSHIFT.name: results.redshift,
     }

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import bpy
 
 from ..core.physics_api import physics
-from .arithmetic import atan2, clamp, floor, log, maximum, minimum, mix, multiply_add, sqrt, where
+from .arithmetic import atan2, clamp, combine, floor, log, maximum, minimum, mix, multiply_add, sqrt, where
 from .builder import Float, Number, TreeBuilder, Vector
-from .redshift import redshift_gain
 
 MAP_ROLE = "umbra_world_map"
 """Custom property of the image nodes that read the map."""
@@ -45,8 +44,8 @@ class WorldOutputs:
     """Values for the Group Output node; `world_group` describes them."""
 
     vector: Vector
-    tint: Vector
-    fault: Vector
+    shift: Vector
+    light: Vector
     shadow: Float
     redshift: Float
 
@@ -122,17 +121,17 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         one_plus_z = header.constant + looking.dot(header.shift)
         # A picture that is not a map must not lead to NaN.
         one_plus_z = maximum(physics.SMALLEST_ONE_PLUS_Z, one_plus_z)
-        gain = redshift_gain(one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature)
+        redshift = where(lensed, one_plus_z, 1.0)
     with builder.frame("Results"):
-        shown = visible * (is_map * resolved)
-        tint = where(lensed, where(shown, gain, (0.0, 0.0, 0.0)), (1.0, 1.0, 1.0))
-        tint = tint * 2.0**inputs.exposure
+        shown = where(lensed, visible * (is_map * resolved), 1.0)
+        brightness = shown * 2.0**inputs.exposure
         # Magenta without a map, and in sky whose ray was not resolved.
         correct = is_map * where(visible, resolved, 1.0)
-        fault = (lensed * (1.0 - correct)).labeled("Magenta if invalid") * physics.INVALID_MAP_COLOR
+        fault = (lensed * (1.0 - correct)).labeled("Magenta if invalid")
+        shift = combine(redshift, inputs.redshift_color, inputs.redshift_brightness)
+        light = combine(inputs.temperature, brightness, fault)
         shadow = lensed * (1.0 - visible)
-        redshift = where(lensed, one_plus_z, 1.0)
-    return WorldOutputs(vector, tint, fault, shadow, redshift)
+    return WorldOutputs(vector, shift, light, shadow, redshift)
 
 
 def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector, Float]:

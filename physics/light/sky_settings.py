@@ -44,7 +44,7 @@ SKY_SETTINGS: dict[str, Setting] = {
     ),
     "sky_temperature": Setting(
         "Sky Temperature",
-        "Color temperature of light that is not colored as a black body is; World and lens take it for all light",
+        "Color temperature of light that is not colored as a black body is; the lens takes it for all light",
         DEFAULT_TEMPERATURE,
         500.0,
         1e6,

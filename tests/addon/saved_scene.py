@@ -2,6 +2,7 @@
 """A small scene that each release saves, for the releases after it to open; and the script that saves one.
 
     python tests/addon/saved_scene.py CHECKOUT OUT.blend [--disk] [--animated]
+    python tests/addon/saved_scene.py CHECKOUT OUT.blend --world
 
 builds the scene with the add-on as it stands in CHECKOUT, a folder with any commit of this repository, and saves it.
 Use the Python that has Blender 4.5, the oldest supported one, whose files all others open. Blender 5 keeps values
@@ -33,6 +34,7 @@ GROUP = {
     "Environment Strength": 1.5,
 }
 ROTATION = (0.1, 0.2, 0.3)
+PLAIN_COLOR, PLAIN_STRENGTH = (0.6, 0.35, 0.15, 1.0), 0.5
 
 
 # Frames and values of the keyframes of an animated scene.
@@ -74,8 +76,8 @@ def compositor_of(scene: bpy.types.Scene) -> bpy.types.NodeTree:
     return scene.node_tree if bpy.app.version < (5, 0) else scene.compositing_node_group
 
 
-def build(*, disk: bool, animated: bool = False) -> bpy.types.Scene:
-    """Make the scene with whatever version of the add-on is enabled."""
+def _empty_scene() -> bpy.types.Scene:
+    """A camera that looks past the origin, without anything else."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     for each in list(bpy.data.objects):
         bpy.data.objects.remove(each)
@@ -92,6 +94,12 @@ def build(*, disk: bool, animated: bool = False) -> bpy.types.Scene:
     camera.location, camera.rotation_euler = (0.0, -10.0, 1.5), (math.radians(82.0), 0.0, 0.0)
     scene.collection.objects.link(camera)
     scene.camera = camera
+    return scene
+
+
+def build(*, disk: bool, animated: bool = False) -> bpy.types.Scene:
+    """Make the scene with whatever version of the add-on is enabled."""
+    scene = _empty_scene()
     scene.umbra.environment_image = _sky()
     for name, value in SCENE.items():
         setattr(scene.umbra, name, value)
@@ -183,7 +191,7 @@ def _add_outputs(scene: bpy.types.Scene) -> None:
         other.umbra.output = output
         assert other.umbra.output == output
     tree = bpy.data.scenes[WORLD_SCENE].world.node_tree
-    (node,) = [each for each in tree.nodes if each.type == "GROUP"]
+    (node,) = [each for each in tree.nodes if "Lensed Light" in each.inputs]
     socket = input_of(node, "Redshift Color")
     for frame, value in KEYFRAMES.items():
         socket.default_value = value
@@ -197,6 +205,47 @@ def _add_outputs(scene: bpy.types.Scene) -> None:
     _drive(follower, "location", world, f"node_tree.{socket.path_from_id('default_value')}", 2)
 
 
+def build_world() -> bpy.types.Scene:
+    """Make a scene with Output: World, whose World has an Environment Texture inside a group, and a plain color."""
+    scene = _empty_scene()
+    scene.cycles.filter_width, scene.cycles.use_denoising = 0.01, False
+    scene.world = bpy.data.worlds.new("Saved World")
+    if bpy.app.version < (5, 0):
+        scene.world.use_nodes = True
+    inner = bpy.data.node_groups.new("Artist's Sky", "ShaderNodeTree")
+    inner.interface.new_socket("Light", in_out="OUTPUT", socket_type="NodeSocketShader")
+    texture, background, end = map(
+        inner.nodes.new, ("ShaderNodeTexEnvironment", "ShaderNodeBackground", "NodeGroupOutput")
+    )
+    texture.image = _sky()
+    inner.links.new(texture.outputs["Color"], background.inputs["Color"])
+    inner.links.new(background.outputs[0], end.inputs[0])
+    tree = scene.world.node_tree
+    tree.nodes.clear()
+    group, plain, both, output = map(
+        tree.nodes.new,
+        ("ShaderNodeGroup", "ShaderNodeBackground", "ShaderNodeAddShader", "ShaderNodeOutputWorld"),
+    )
+    group.node_tree = inner
+    plain.inputs["Color"].default_value, plain.inputs["Strength"].default_value = PLAIN_COLOR, PLAIN_STRENGTH
+    tree.links.new(group.outputs[0], both.inputs[0])
+    tree.links.new(plain.outputs[0], both.inputs[1])
+    tree.links.new(both.outputs[0], output.inputs["Surface"])
+    hole = bpy.data.objects.new("Hole", None)
+    scene.collection.objects.link(hole)
+    hole.umbra.is_black_hole = True
+    for name, value in HOLE.items():
+        setattr(hole.umbra, name, value)
+    scene.umbra.active_hole = hole
+    scene.umbra.environment_source = "WORLD"
+    assert bpy.ops.umbra.set_output(output="WORLD") == {"FINISHED"}
+    (node,) = [each for each in scene.world.node_tree.nodes if "Lensed Light" in each.inputs]
+    for name, value in GROUP.items():
+        if name in node.inputs:
+            node.inputs[name].default_value = value
+    return scene
+
+
 def main() -> None:
     """Build and save the scene."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -204,12 +253,16 @@ def main() -> None:
     parser.add_argument("output", type=Path)
     parser.add_argument("--disk", action="store_true")
     parser.add_argument("--animated", action="store_true")
+    parser.add_argument("--world", action="store_true")
     options = parser.parse_args()
     sys.path.insert(0, str(options.checkout.resolve()))
     import blender_addon
 
     blender_addon.register()
-    build(disk=options.disk, animated=options.animated)
+    if options.world:
+        build_world()
+    else:
+        build(disk=options.disk, animated=options.animated)
     bpy.context.preferences.filepaths.save_version = 0
     with tempfile.TemporaryDirectory() as folder:  # a file keeps the path that it is saved to
         path = Path(folder) / options.output.name

@@ -21,8 +21,8 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "node_groups"
 RENEW = "UMBRA_RENEW_SNAPSHOTS"
 BLENDER = f"blender{bpy.app.version[0]}"
-GROUPS = ("black_hole", "black_hole_filtered", "disk_2", "disk_image", "disk_image_picture", "world")
-ALIKE = ("world",)  # the same nodes in each version of Blender
+GROUPS = ("black_hole", "black_hole_filtered", "disk_2", "disk_image", "disk_image_picture", "world", "world_tint")
+ALIKE = ("world", "world_tint")  # the same nodes in each version of Blender
 UNBOUNDED = 1e30
 
 Places: TypeAlias = dict[bpy.types.Node, tuple[str, int]]
@@ -40,6 +40,7 @@ def build(addon_module: Callable[[str], ModuleType]) -> Callable[[str], bpy.type
         "disk_image": lambda: disk.image_group(picture=False).ensure(),
         "disk_image_picture": lambda: disk.image_group(picture=True).ensure(),
         "world": world.new_group,
+        "world_tint": addon_module("nodes.world_tint").GROUP.ensure,
     }
     return lambda name: builders[name]()
 

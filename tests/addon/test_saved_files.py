@@ -10,7 +10,20 @@ import bpy
 import numpy as np
 import pytest
 from compositor_scene import MapArrays
-from saved_scene import ARTISTS_NODE, GROUP, HOLE, ROTATION, SCENE, build, compositor_of, sky_pixels
+from saved_scene import (
+    ARTISTS_NODE,
+    GROUP,
+    HOLE,
+    PLAIN_COLOR,
+    PLAIN_STRENGTH,
+    ROTATION,
+    SCENE,
+    SIZE,
+    build,
+    build_world,
+    compositor_of,
+    sky_pixels,
+)
 from small_scene import render
 
 import physics
@@ -18,11 +31,12 @@ from physics.images import exr
 from physics.reference import reference_render
 
 SAVED = Path(__file__).resolve().parents[1] / "data" / "saved_files"
-FILES = [path for path in sorted(SAVED.glob("*.blend")) if not path.stem.startswith("animated")]
+FILES = [path for path in sorted(SAVED.glob("*.blend")) if not path.stem.startswith(("animated", "world"))]
 
 # What group_1 is: the first whole version of the add-on, whose node group had no input for a disk.
 FIRST = SAVED / "group_1.blend"
 LATEST = SAVED / "0.1.0.blend"
+WORLD = SAVED / "world_3.blend"
 
 LARGEST_FILE = 400_000
 MACHINE_PATH = re.compile(rb"(?:/home/|/Users/|/work/|/var/|/opt/|[A-Z]:\\Users)[ -~]*")
@@ -122,7 +136,57 @@ def test_it_renders_as_the_same_scene_does_that_is_new(tmp_path: Path, path: Pat
     assert np.ptp(old[..., 0]) > 0.1
 
 
-@pytest.mark.parametrize("path", [*FILES, SAVED / "animated_4.5.blend"], ids=lambda path: path.stem)
+def test_a_lensed_world_gets_the_temperatures_of_its_colors(
+    addon_module: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    """Version 3 of its group multiplied all colors by one Tint; numpy has each color of each Background by its own."""
+    with bpy.data.libraries.load(str(WORLD)) as (source, target):
+        target.node_groups = [name for name in source.node_groups if name.startswith("Umbra World")]
+    (former,) = target.node_groups
+    assert "Tint" in [item.name for item in former.interface.items_tree]
+
+    scene = opened(WORLD, tmp_path)
+    world_group, world_tint = addon_module("nodes.world_group"), addon_module("nodes.world_tint")
+    (node,) = [each for each in scene.world.node_tree.nodes if "Lensed Light" in each.inputs]
+    assert world_group.is_current(node.node_tree)
+    (tint,) = [tree for tree in bpy.data.node_groups if world_tint.GROUP.owns(tree)]
+    assert (tint.users, world_tint.GROUP.is_current(tint)) == (2, True)
+    assert {name: node.inputs[name].default_value for name in GROUP if name in node.inputs} == pytest.approx(
+        {name: value for name, value in GROUP.items() if name in node.inputs}
+    )
+    picture = render(scene, tmp_path / "picture.exr", exr)[..., :3]
+
+    (path,) = (tmp_path / "maps").glob("*_world_*.exr")
+    width, height = SIZE
+    lens = scene.camera.data
+    camera = physics.PerspectiveCamera(width, height, focal_length=lens.lens, sensor_width=lens.sensor_width)
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    axes = np.array(scene.camera.matrix_world, dtype=np.float64)[:3, :3]
+    looking = camera.directions(column.ravel(), row.ravel()) @ axes.T
+    origin, one_plus_z, visible = physics.read_world_map(path).look_up(looking)
+    amounts = GROUP["Redshift Color"], GROUP["Redshift Brightness"], GROUP["Sky Temperature"]
+    expected = np.zeros((width * height, 3))
+    for color, strength in (
+        (reference_render.sample_environment(sky_pixels(), origin), 1.0),
+        (np.broadcast_to(PLAIN_COLOR[:3], expected.shape), PLAIN_STRENGTH),
+    ):
+        expected += strength * color * physics.redshift_gain(one_plus_z, *amounts, color)
+    expected *= 2.0 ** GROUP["Exposure"] * visible[:, np.newaxis]
+    # Blender's own look-up reaches over the poles, within a texel.
+    where = visible & (np.abs(origin[:, 2]) < np.cos(np.pi / 16))
+    assert 0.2 < where.mean() < 0.95
+    found = (np.abs(picture.reshape(-1, 3) - expected) / np.maximum(expected, 0.1)).max(axis=-1)[where]
+    assert np.median(found) < 2e-6  # single precision
+    assert np.quantile(found, 0.98) < 1e-4
+    assert (found > 1e-2).sum() <= 2, "a ray may fall on the other side of the edge"
+
+    scene = build_world()
+    scene.umbra.map_folder = str(tmp_path / "new maps")
+    new = render(scene, tmp_path / "new.exr", exr)[..., :3]
+    np.testing.assert_allclose(picture, new, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("path", [*FILES, WORLD, SAVED / "animated_4.5.blend"], ids=lambda path: path.stem)
 def test_files_are_small_and_name_no_machine(tmp_path: Path, path: Path) -> None:
     assert path.stat().st_size < LARGEST_FILE
     bpy.ops.wm.open_mainfile(filepath=str(path))

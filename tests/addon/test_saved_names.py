@@ -51,7 +51,7 @@ def node_of(tree: bpy.types.NodeTree, role: str) -> bpy.types.Node:
 
 
 def world_node(scene: bpy.types.Scene) -> bpy.types.Node:
-    (node,) = [each for each in scene.world.node_tree.nodes if each.type == "GROUP"]
+    (node,) = [each for each in scene.world.node_tree.nodes if "Lensed Light" in each.inputs]
     return node
 
 

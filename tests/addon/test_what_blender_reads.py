@@ -39,7 +39,7 @@ def shot(request: pytest.FixtureRequest, scene: bpy.types.Scene) -> bpy.types.Sc
 def readers(scene: bpy.types.Scene) -> list[Reader]:
     """The nodes that read maps and passes."""
     if scene.umbra.output == "WORLD":
-        (group,) = [node.node_tree for node in scene.world.node_tree.nodes if node.type == "GROUP"]
+        group = scene.world.node_tree.nodes["Umbra World"].node_tree
         return [node for node in group.nodes if node.type == "TEX_IMAGE"]
     roles = ("map", "disk_pass", "disk_colors")
     return [node for node in compositor(scene).nodes if str(node.get("umbra_role", "")).startswith(roles)]
@@ -204,8 +204,8 @@ def test_a_world_whose_group_is_cut_off(
     add_hole(scene)
     bpy.ops.umbra.set_output(output="WORLD")
     tree = scene.world.node_tree
-    (group,) = [node for node in tree.nodes if node.type == "GROUP"]
-    (link,) = group.outputs["Tint"].links
+    group = tree.nodes["Umbra World"]
+    (link,) = group.outputs["Light"].links
     scene.world.cycles.sampling_method = "NONE"
     if way == "muted group":
         group.mute = True

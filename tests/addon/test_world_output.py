@@ -86,7 +86,7 @@ def predicted(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tu
     origin, one_plus_z, visible = map_of(scene, physics, frame).look_up(looking(scene, physics))
     turned = origin @ physics.physics.numerics.sphere.euler_rotation(ROTATION).T
     colors = physics.physics.reference.reference_render.sample_environment(environment_pixels(), turned)
-    colors *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
+    colors *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE, colors)
     colors[~visible] = 0.0
     polar = np.arccos(np.abs(turned[:, 2]).clip(max=1.0))
     return colors.reshape(*SIZE[::-1], 3), (polar > math.pi / 16).reshape(SIZE[::-1])
@@ -176,7 +176,7 @@ def test_other_rays_see_the_lensed_or_the_plain_sky(scene, physics, tmp_path) ->
     origin, one_plus_z, visible = map_of(scene, physics).look_up(mirrored)
     turned = origin @ physics.physics.numerics.sphere.euler_rotation(ROTATION).T
     expected = physics.physics.reference.reference_render.sample_environment(environment_pixels(), turned)
-    expected *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE)
+    expected *= physics.physics.redshift_gain(one_plus_z, 1.0, 1.0, physics.physics.DEFAULT_SKY_TEMPERATURE, expected)
     expected[~visible] = 0.0
     found = differences(lensed, expected.reshape(*SIZE[::-1], 3), (np.abs(turned[:, 2]) < 0.98).reshape(SIZE[::-1]))
     assert np.quantile(found, 0.98) < 1e-3

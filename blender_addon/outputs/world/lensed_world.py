@@ -3,7 +3,7 @@
 
 The artist's World is never touched, so that what comes back is exactly what was there. The copy keeps all of its
 nodes: the group's Vector takes the place of Generated coordinates, and the color of each Background or Emission passes
-by the group's Tint and Fault.
+by the group "Umbra World Tint" (`tinting`).
 """
 
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from ...core.errors import SceneError
 from ...nodes import world_group, world_nodes
 from ...scene.sky import environment, image_world
 from ...scene.sky.node_paths import SHINING
+from . import tinting
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
@@ -167,6 +168,7 @@ def _delete(world: bpy.types.World) -> None:
     for each in copies:  # outer ones come first
         if each.users == 0:
             bpy.data.node_groups.remove(each)
+    tinting.remove_unused()
     if group is None or group.users > 0:
         return
     images.update(each.image for each in world_nodes.map_nodes(group) if each.image is not None)
@@ -207,7 +209,11 @@ def _inner_trees(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
     while waiting:
         for node in waiting.pop(0).nodes:
             inner = node.node_tree if node.type == "GROUP" else None
-            if inner is not None and inner not in found and not world_group.is_group(inner):
+            if (
+                inner is not None
+                and inner not in found
+                and not (world_group.is_group(inner) or tinting.is_group(inner))
+            ):
                 found.append(inner)
                 waiting.append(inner)
     return found
@@ -222,8 +228,8 @@ class _Sources:
     """The group's results, as sockets in one tree."""
 
     vector: bpy.types.NodeSocket
-    tint: bpy.types.NodeSocket
-    fault: bpy.types.NodeSocket
+    shift: bpy.types.NodeSocket
+    light: bpy.types.NodeSocket
 
 
 def _insert(world: bpy.types.World) -> bpy.types.Node:
@@ -236,7 +242,7 @@ def _insert(world: bpy.types.World) -> bpy.types.Node:
     node.name = node.label = world_group.GROUP_NAME
     node.width = 220.0
     node.location = (min(each.location.x for each in tree.nodes) - 320.0, 0.0)
-    outputs = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.TINT, world_group.FAULT)]
+    outputs = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.SHIFT, world_group.LIGHT)]
     _bend(tree, _Sources(*outputs), {node.name})
     return node
 
@@ -249,7 +255,7 @@ def _bend(tree: bpy.types.NodeTree, sources: _Sources, ours: set[str]) -> None:
         if node.type in _LOOK_BY_THEMSELVES and "Vector" in node.inputs and not node.inputs["Vector"].is_linked:
             tree.links.new(sources.vector, node.inputs["Vector"])
         elif node.type in SHINING:
-            _tint(tree, node, sources)
+            tinting.add(tree, node, sources.shift, sources.light)
         elif node.type == "GROUP" and node.node_tree is not None:
             _bend_group(tree, node, node.node_tree.copy(), sources)
 
@@ -284,27 +290,20 @@ def _bend_group(tree: bpy.types.NodeTree, node: Any, inner: bpy.types.NodeTree, 
     entry = inner.nodes.new("NodeGroupInput")
     entry.location = (min(each.location.x for each in inner.nodes) - 320.0, 0.0)
     passed = []
-    for name, outer in (("Vector", sources.vector), ("Tint", sources.tint), ("Fault", sources.fault)):
-        added = inner.interface.new_socket(f"Umbra {name}", in_out="INPUT", socket_type="NodeSocketVector")
+    for name, outer in (("Vector", sources.vector), ("Shift", sources.shift), ("Light", sources.light)):
+        added = inner.interface.new_socket(tinting.PASSED + name, in_out="INPUT", socket_type="NodeSocketVector")
         tree.links.new(outer, next(each for each in node.inputs if each.identifier == added.identifier))
         passed.append(next(each for each in entry.outputs if each.identifier == added.identifier))
     _bend(inner, _Sources(*passed), {entry.name})
 
 
-def _tint(tree: bpy.types.NodeTree, background: bpy.types.Node, sources: _Sources) -> None:
-    """Let a Background's color pass by the group's Tint and Fault."""
-    color = background.inputs["Color"]
-    tint = tree.nodes.new("ShaderNodeVectorMath")
-    tint.operation = "MULTIPLY_ADD"
-    tint.name = tint.label = "Umbra Tint"
-    tint.location = (background.location.x - 60.0, background.location.y - 180.0)
-    if color.is_linked:
-        tree.links.new(color.links[0].from_socket, tint.inputs[0])
-    else:
-        tint.inputs[0].default_value = tuple(color.default_value)[:3]
-    tree.links.new(sources.tint, tint.inputs[1])
-    tree.links.new(sources.fault, tint.inputs[2])
-    tree.links.new(tint.outputs["Vector"], color)
+def renew(world: bpy.types.World) -> None:
+    """Rebuild the groups of a lensed World that are not current; image nodes of a rebuilt one have no map."""
+    group = group_of(world)
+    if group is None:
+        return
+    tinting.renew(group, [world.node_tree, *(each for each in _inner_trees(world.node_tree) if _COPY in each)])
+    world_group.mend(group)
 
 
 def unbent(scene: bpy.types.Scene) -> list[str]:

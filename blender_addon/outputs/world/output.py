@@ -174,14 +174,14 @@ def check_world(scene: bpy.types.Scene) -> None:
 
 
 def _check_used(scene: bpy.types.Scene, node: bpy.types.Node) -> None:
-    needed = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.TINT, world_group.FAULT)]
+    needed = [node.outputs[each.name] for each in (world_group.VECTOR, world_group.SHIFT, world_group.LIGHT)]
     links = [link for socket in needed for link in socket.links]
     muted = node.mute or any(link.is_muted or link.to_node.mute for link in links)
     if muted or not all(socket.is_linked for socket in needed[1:]):
         raise SceneError(
             f'The node "{node.name}" in World "{scene.world.name if scene.world else ""}", or what it feeds, is muted '
-            "or cut off: unmute it (M) and connect its Vector, Tint and Fault again, or choose another output and then "
-            "Output: World.",
+            "or cut off: unmute it (M) and connect its Vector, Shift and Light again, or choose another output and "
+            "then Output: World.",
             code="sky.group-cut",
         )
 

@@ -10,7 +10,6 @@ from ...bake.names import sequence_path
 from ...core import messages
 from ...core.errors import SceneError
 from ...core.physics_api import physics
-from ...nodes import world_group
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
 from ..shared.look import look_of_group, write_to_group
@@ -55,13 +54,14 @@ def _is_stale(scene: bpy.types.Scene, world: bpy.types.World, *, shows_image: bo
 
 def _group(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
     """The group in the scene's lensed World, whole, and its own: a copy of the World shares it at first."""
-    node = lensed_world.group_node(lensed_world.lensed_world(scene))
-    if node is None or node.node_tree is None:
+    world = lensed_world.lensed_world(scene)
+    node = lensed_world.group_node(world)
+    if world is None or node is None or node.node_tree is None:
         return None
     if node.node_tree.library is None:
         if node.node_tree.users > 1:
             node.node_tree = node.node_tree.copy()
-        world_group.mend(node.node_tree)
+        lensed_world.renew(world)
     return node.node_tree
 
 
