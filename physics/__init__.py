@@ -119,10 +119,12 @@ from .maps.world_map import STAMP as WORLD_MAP_STAMP
 from .maps.world_map import WorldMap
 from .maps.world_map import world_map_steps as bake_world_map_steps
 from .maps.world_map import world_parameters as world_map_parameters
-from .matter.light_layer import LightBaker, LightLayer, LightParameters, clock_rate, render_matter
+from .matter.light_layer import LightBaker, LightLayer, LightParameters, clock_rate, light_steps, render_matter
+from .matter.mean_light import disk_radiance
+from .matter.picture import Picture
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
-from .numerics.work import drain
+from .numerics.work import drain, share_of
 from .reference.disk_render import disk_layers
 from .reference.disk_render import over_sky as disk_over_sky
 from .reference.reference_render import (
@@ -231,6 +233,7 @@ __all__ = [
     "Observer",
     "PanoramaCamera",
     "PerspectiveCamera",
+    "Picture",
     "ReferencePicture",
     "Setting",
     "SkyLevels",
@@ -266,6 +269,7 @@ __all__ = [
     "disk_over_sky",
     "disk_pattern_period",
     "disk_pattern_shares",
+    "disk_radiance",
     "disk_texture",
     "drain",
     "ergosphere_radius",
@@ -278,6 +282,7 @@ __all__ = [
     "horizon_radius",
     "isco_radius",
     "light_layer_path",
+    "light_steps",
     "linear_from_srgb",
     "load_stars",
     "local_velocity",
@@ -311,6 +316,7 @@ __all__ = [
     "replacing_file",
     "shade_disk",
     "shadow_outline",
+    "share_of",
     "sky_levels",
     "star_sky",
     "stars_path",

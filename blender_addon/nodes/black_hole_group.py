@@ -17,9 +17,9 @@ Warp Map
     An Image node with the baked EXR, a single image or a sequence. The image must be Non-Color
     (`image.colorspace_settings.name`) and Channel Packed (`image.alpha_mode = "CHANNEL_PACKED"`). Its
     size is the render's, or 2 or 4 times that. It must be linked directly, without other nodes in between.
-Disk
-    The output of the node group "Umbra Disk" (see `disk_group`), of the render's size. If it is not linked, there is
-    no disk.
+Disk, Disk Exposure, Disk Tint, Disk Opacity
+    An Image node with the baked layer of light, set like the warp map's, and what is done to it; see `disk_layer`. If
+    it is not linked, there is no disk.
 Depth, Hole Depth, Hide Behind
     The Depth output of the Render Layers node that feeds Render; the depth of the hole's center in the same measure
     (along the camera's axis for a perspective camera, from the camera for a panorama); and 1 to hide, inside the
@@ -44,12 +44,12 @@ from typing import Any
 import bpy
 
 from ..core.physics_api import physics
-from . import black_hole_nodes, filtered_sky
+from . import black_hole_nodes, disk_layer, filtered_sky
 from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 5
+GROUP_VERSION = 6
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
@@ -93,13 +93,6 @@ STRENGTH = SocketSpec(
     maximum=1.0e6,
 )
 EXPOSURE, REDSHIFT_COLOR, REDSHIFT_BRIGHTNESS, TEMPERATURE = map(setting_socket, physics.SKY_SETTINGS.values())
-DISK = SocketSpec(
-    "Disk",
-    "NodeSocketColor",
-    "The accretion disk of the node group Umbra Disk, premultiplied: in front of the sky and behind the scene",
-    default=(0.0, 0.0, 0.0, 0.0),
-    hide_value=True,
-)
 DEPTH = SocketSpec(
     "Depth",
     "NodeSocketFloat",
@@ -158,7 +151,7 @@ INPUTS = (
     REDSHIFT_COLOR,
     REDSHIFT_BRIGHTNESS,
     TEMPERATURE,
-    DISK,
+    *disk_layer.SOCKETS,
     DEPTH,
     HOLE_DEPTH,
     HIDE_BEHIND,
@@ -179,7 +172,7 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
         redshift_color=values[REDSHIFT_COLOR.name],
         redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
         temperature=values[TEMPERATURE.name],
-        disk=values[DISK.name],
+        disk=disk_layer.disk_light(*(values[each.name] for each in disk_layer.SOCKETS)),
         depth=values[DEPTH.name],
         hole_depth=values[HOLE_DEPTH.name],
         hide_behind=values[HIDE_BEHIND.name],

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from ..core.physics_api import physics
 from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_integer, sin, sqrt, where
 from .builder import Float, TreeBuilder, Vector
+from .disk_layer import DiskLight
 from .filtered_sky import filtered
 from .image_lookup import sample_bilinearly
 from .image_nodes import erode, separate_color
@@ -35,7 +36,7 @@ NO_DEPTH = 1e9
 
 @dataclass(frozen=True)
 class GroupInputs:
-    """Values of the Group Input node; `black_hole_group` describes them."""
+    """Values of the Group Input node, which `black_hole_group` describes; of the disk, what its inputs give."""
 
     render: Vector
     environment: Vector
@@ -46,7 +47,7 @@ class GroupInputs:
     redshift_color: Float
     redshift_brightness: Float
     temperature: Float
-    disk: Vector
+    disk: DiskLight
     depth: Float
     hole_depth: Float
     hide_behind: Float
@@ -215,12 +216,12 @@ def _compose(inputs: GroupInputs, sky: Vector, data: Vector, behind: Float) -> G
     no sky in it to be covered.
     """
     visibility, one_plus_z, valid = data.separate()
-    _, _, _, covered = separate_color(inputs.disk)
-    sky = multiply_add(sky, 1.0 - covered, inputs.disk)
+    valid = valid * inputs.disk.there
+    sky = multiply_add(sky, 1.0 - inputs.disk.covers, inputs.disk.light)
     _, _, _, alpha = separate_color(inputs.render)
     hidden = ((1.0 - visibility) * behind).labeled("Hidden")
     image = multiply_add(sky, 1.0 - alpha, inputs.render * (1.0 - hidden))
-    image = multiply_add(inputs.disk, alpha * hidden, image)
+    image = multiply_add(inputs.disk.light, alpha * hidden, image)
     return GroupOutputs(
         image=where(valid, image, physics.INVALID_MAP_COLOR).labeled("Magenta if invalid"),
         sky=sky,

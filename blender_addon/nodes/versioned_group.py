@@ -43,7 +43,7 @@ class SocketSpec:
 
 
 def setting_socket(setting: physics.Setting) -> SocketSpec:
-    """Return the input of a row of the tables `physics.DISK_SETTINGS` and `physics.SKY_SETTINGS`."""
+    """Return the input of a row of the table `physics.SKY_SETTINGS`."""
     low, high = setting.limits
     choices = ", ".join(f"{each.socket_value:g} is {each.label}" for each in setting.choices)
     return SocketSpec(

@@ -83,10 +83,13 @@ class ViewportMaps(Protocol):
         """Return whether the scene reads a map in memory now."""
 
     def show(self, scene: bpy.types.Scene, made: "physics.WarpMap") -> None:
-        """Show a map, with the passes of its disk if it has any; those of a disk that it lacks stay as they are."""
+        """Show a map; the disk's light stays as it is."""
 
-    def has_disk(self, scene: bpy.types.Scene) -> bool:
-        """Return whether the scene reads all passes of its disk from memory, of whatever frame they are."""
+    def show_light(self, scene: bpy.types.Scene, layer: "physics.LightLayer") -> None:
+        """Show a layer of light of the disk, if the scene has one."""
+
+    def has_light(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene's disk, if it has one, is read from memory, of whatever frame it is."""
 
     def show_again(self, scene: bpy.types.Scene) -> bool:
         """Show the map in memory once more, after the scene was given its files; return False if there is none."""

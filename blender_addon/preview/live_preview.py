@@ -200,7 +200,7 @@ def _step(scene: bpy.types.Scene, now: _State) -> None:
         frame = frames.read(scene, depsgraph, False)
         now.problem = ""
         camera = _camera_of(scene, depsgraph, frame)
-        key = (frame.parameters, camera, scene.umbra.output, thumbnail.key(scene))
+        key = (frame.parameters, frame.light, camera, scene.umbra.output, thumbnail.key(scene))
         if key == now.shown:
             return
         now.shown = key
@@ -247,7 +247,7 @@ def _work(
             now.latency = time.perf_counter() - now.since
             redraw()
             yield
-    picture = yield from _paused(thumbnail.steps(uid, replace(draft, camera=camera)))
+    picture = yield from _paused(thumbnail.steps(uid, replace(draft, camera=camera), frame.light))
     scene = scene_of(uid)
     if picture is not None and scene is not None:
         thumbnail.show(scene, picture)

@@ -12,6 +12,7 @@ import bpy
 
 from ..bake import check
 from ..core.physics_api import physics
+from ..core.session import SESSION, Life
 from ..outputs import registry
 from ..outputs.protocol import ViewportMaps
 from ..scene.frame_setup import FrameSetup
@@ -39,8 +40,10 @@ class State:
     shows: Shows = Shows.NOTHING
     wanted: object = None
     """What the current frame's picture is made from."""
-    disk_of: object = None
-    """What the disk's passes in memory were made for."""
+    view: object = None
+    """What the map in memory was made for."""
+    light_of: object = None
+    """What the layer of light in memory was made for."""
     frame: FrameSetup | None = None
     changed_at: float = 0.0
     steps: Generator[float, None, Any] | None = None
@@ -60,34 +63,65 @@ class State:
 IN_MEMORY = (Shows.SMALL, Shows.FULL, Shows.PLAIN)
 
 
+# Traces once what the layers of light in the viewport have in common.
+_light_baker = SESSION.value(physics.LightBaker, Life.FILE)
+
+
 def show_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps, frame: FrameSetup) -> bool:
-    """Show the files where they are up to date, else a small map; return whether one was traced."""
-    same = frame.parameters == now.wanted
+    """Show the files where they are up to date, else a small map; return whether that was traced, and it alone."""
+    wanted = wanted_of(frame)
+    same = wanted == now.wanted
     moved_on = now.frame is None or now.frame.frame != frame.frame
     may_be_baked = moved_on or same or now.shows is not Shows.SMALL
-    now.wanted, now.frame = frame.parameters, frame
+    same_view = now.shows in IN_MEMORY and frame.parameters == now.view
+    now.wanted, now.frame = wanted, frame
     if may_be_baked and show_files_of_frame(scene, now, maps):
         return False
     if same and now.shows in IN_MEMORY and maps.show_again(scene):
         return False  # a change of settings had given the nodes their files
     if now.shows is Shows.FAILED:
         maps.show_files(scene)  # those of the disk
-    alone = frame.parameters.disk is None or _has_disk(scene, maps, frame)
-    if alone:
-        maps.show(scene, physics.bake(small_maps.small(frame.parameters, now.pixels)))
+    if same_view:
+        maps.show_again(scene)
     else:
-        maps.show(scene, physics.bake(small_maps.small_with_disk(frame.parameters)))
-        now.disk_of = frame.parameters
+        maps.show(scene, physics.bake(small_maps.small(frame.parameters, now.pixels)))
+        now.view = frame.parameters
+    # Another look of a thin disk is quick; else an older layer is seen meanwhile, if there is one.
+    at_once = frame.light is not None and (
+        (same_view and frame.light.look.thickness == 0.0) or not _has_light(scene, maps, frame)
+    )
+    if at_once:
+        assert frame.light is not None
+        maps.show_light(scene, physics.drain(light_steps(small_maps.small_light(frame.light))))
+        now.light_of = frame.light
     now.shows, now.steps, now.changed_at = Shows.SMALL, None, time.perf_counter()
-    return alone
+    return not same_view and not at_once
 
 
-def _has_disk(scene: bpy.types.Scene, maps: ViewportMaps, frame: FrameSetup) -> bool:
+def wanted_of(frame: FrameSetup) -> object:
+    """Return all that a frame's picture is made from."""
+    return frame.parameters, frame.light
+
+
+def light_steps(light: "physics.LightParameters") -> Generator[float, None, "physics.LightLayer"]:
+    """Make a layer of light step by step; what it shares with the one before is not traced again."""
+    return (yield from _light_baker.now.steps(light))
+
+
+def full_steps(frame: FrameSetup) -> Generator[float, None, "tuple[physics.WarpMap, physics.LightLayer | None]"]:
+    """Make the full map, and the full layer of light if there is a disk, step by step."""
+    made = yield from physics.bake_steps(small_maps.full(frame.parameters))
+    if frame.light is None:
+        return made, None
+    return made, (yield from light_steps(small_maps.full_light(frame.light)))
+
+
+def _has_light(scene: bpy.types.Scene, maps: ViewportMaps, frame: FrameSetup) -> bool:
     """Whether there is a disk to be seen meanwhile, if only an older one."""
-    if maps.has_disk(scene):
+    if maps.has_light(scene):
         return True
     requests = small_maps.requests_of(scene, frame)
-    return bool(requests) and all(path.is_file() for each in requests for path in each.passes)
+    return bool(requests) and all(each.path.is_file() for each in requests)
 
 
 def show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgraph: bpy.types.Depsgraph) -> None:
@@ -95,7 +129,7 @@ def show_plain(scene: bpy.types.Scene, now: State, maps: ViewportMaps, depsgraph
     wanted = plain_map.read(scene, depsgraph)
     if wanted != now.wanted or not maps.is_shown(scene):
         maps.show(scene, plain_map.make(wanted))
-    now.shows, now.wanted, now.frame, now.steps = Shows.PLAIN, wanted, None, None
+    now.shows, now.wanted, now.view, now.frame, now.steps = Shows.PLAIN, wanted, None, None, None
 
 
 def show_files_of_frame(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> bool:

@@ -20,6 +20,9 @@ Camera = physics.PerspectiveCamera | physics.PanoramaCamera
 # follows on a slow machine: with fewer, stars are squares.
 SMALL_PIXELS, FULL_PIXELS, LEAST_PIXELS = 480 * 270, 1920 * 1080, 320 * 180
 
+# Pixels of layers of a thick disk, each of which takes some 20 microseconds.
+SMALL_THICK_PIXELS, FULL_THICK_PIXELS = 160 * 90, 480 * 270
+
 # Error of interpolation of a small disk, radians: a few of its pixels. Less would take half as long again.
 DISK_INTERPOLATION = 1e-2
 
@@ -31,19 +34,26 @@ def shrunk(camera: Camera, pixels: float) -> Camera:
 
 
 def small(parameters: physics.WarpMapParameters, pixels: float = SMALL_PIXELS) -> physics.WarpMapParameters:
-    """Return what the small map of a frame is made from, without a disk."""
+    """Return what the small map of a frame is made from."""
     return _of_size(parameters, pixels, ACCURACIES["DRAFT"], None)
 
 
-def small_with_disk(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
-    """Return what the small map of a frame is made from, with its disk."""
+def small_light(light: physics.LightParameters) -> physics.LightParameters:
+    """Return what the small layer of light of a frame is made from."""
     tolerance, _ = ACCURACIES["DRAFT"]
-    return _of_size(parameters, SMALL_PIXELS, (tolerance, DISK_INTERPOLATION), parameters.disk)
+    pixels = SMALL_THICK_PIXELS if light.look.thickness > 0.0 else SMALL_PIXELS
+    return replace(light, view=_of_size(light.view, pixels, (tolerance, DISK_INTERPOLATION), light.view.disk))
 
 
 def full(parameters: physics.WarpMapParameters) -> physics.WarpMapParameters:
     """Return what the full map of a frame is made from, where its files are not up to date."""
-    return _of_size(parameters, FULL_PIXELS, ACCURACIES["STANDARD"], parameters.disk)
+    return _of_size(parameters, FULL_PIXELS, ACCURACIES["STANDARD"], None)
+
+
+def full_light(light: physics.LightParameters) -> physics.LightParameters:
+    """Return what the full layer of light of a frame is made from."""
+    pixels = FULL_THICK_PIXELS if light.look.thickness > 0.0 else FULL_PIXELS
+    return replace(light, view=_of_size(light.view, pixels, ACCURACIES["STANDARD"], light.view.disk))
 
 
 def _of_size(

@@ -15,8 +15,10 @@ from ..core import color_spaces
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life, scene_of
 from ..outputs import registry
+from ..scene import frame_setup
 from ..scene.sky import environment
 from ..settings.scene_properties import SKY_PROPERTIES
+from . import small_maps
 
 # Pixels of the longer side.
 SIDE = 192
@@ -96,27 +98,51 @@ def clear() -> None:
     _collection.clear()
 
 
-def steps(uid: int, parameters: "physics.WarpMapParameters") -> Generator[float, None, Array | None]:
+def steps(
+    uid: int, parameters: "physics.WarpMapParameters", light: "physics.LightParameters | None"
+) -> Generator[float, None, Array | None]:
     """Make the thumbnail of a frame step by step; None if the scene is gone."""
-    camera = parameters.camera
-    longer = max(camera.width, camera.height)
-    small = replace(
-        parameters,
-        camera=replace(
-            camera,
-            width=max(round(camera.width * SIDE / longer), 1),
-            height=max(round(camera.height * SIDE / longer), 1),
-        ),
-        supersampling=1,
-        interpolation=2e-3,
-    )
-    warp_map = yield from physics.bake_steps(small)
+    small = _small(parameters)
+    warp_map = yield from physics.share_of(physics.bake_steps(small), 0.0, 0.5)
+    layer = None
+    if light is not None:
+        shot = replace(small, disk=light.view.disk, interpolation=small_maps.DISK_INTERPOLATION)
+        layer = yield from physics.share_of(physics.light_steps(replace(light, view=shot)), 0.5, 1.0)
     scene = scene_of(uid)
     if scene is None:
         return None
     picture = physics.render_reference(warp_map, _sky_of(scene), **look(scene)).sky
+    if layer is not None:
+        _lay_over(scene, layer, picture)
     picture[..., :3] = _encoded(picture[..., :3])
     return picture[::-1]
+
+
+def _small(parameters: "physics.WarpMapParameters") -> "physics.WarpMapParameters":
+    camera = parameters.camera
+    longer = max(camera.width, camera.height)
+    width, height = (max(round(each * SIDE / longer), 1) for each in (camera.width, camera.height))
+    return replace(
+        parameters,
+        camera=camera.resized(width, height),
+        supersampling=1,
+        interpolation=2e-3,
+    )
+
+
+def _live(scene: bpy.types.Scene) -> tuple[float, ...]:
+    """Return the live controls of the disk: exposure, opacity and tint."""
+    hole = frame_setup.find_active_hole(scene)
+    disk = None if hole is None else hole.umbra.disk
+    return (0.0, 1.0, 1.0, 1.0, 1.0) if disk is None else (disk.exposure, disk.opacity, *disk.tint)
+
+
+def _lay_over(scene: bpy.types.Scene, layer: "physics.LightLayer", picture: Array) -> None:
+    """Lay a disk over a picture, in place, as the compositor does."""
+    exposure, opacity, *tint = _live(scene)
+    left = 1.0 - (1.0 - layer.transmittance) * opacity
+    picture[..., :3] *= left[..., None]
+    picture[..., :3] += layer.light * (np.array(tint) * (2.0**exposure * opacity))
 
 
 def _encoded(values: Array) -> Array:
@@ -143,7 +169,7 @@ def look(scene: bpy.types.Scene) -> dict[str, Any]:
 
 def key(scene: bpy.types.Scene) -> tuple[object, ...]:
     """All that the thumbnail depends on besides the shot."""
-    return (_image_key(_image_of(scene)), *look(scene).items())
+    return (_image_key(_image_of(scene)), *look(scene).items(), *_live(scene))
 
 
 def _sky_of(scene: bpy.types.Scene) -> Array:

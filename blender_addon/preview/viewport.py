@@ -21,7 +21,17 @@ from ..outputs import frames, registry
 from ..outputs.protocol import ViewportMaps
 from ..scene import presence, stepping
 from . import live_preview, small_maps, views
-from .shown import IN_MEMORY, Shows, State, show_files_of_frame, show_frame, show_plain
+from .shown import (
+    IN_MEMORY,
+    Shows,
+    State,
+    full_steps,
+    light_steps,
+    show_files_of_frame,
+    show_frame,
+    show_plain,
+    wanted_of,
+)
 
 # Seconds without a change after which the disk follows, and after which things rest.
 PAUSE_OF_DISK, REST = 0.1, 0.3
@@ -138,7 +148,7 @@ def _follow(scene: bpy.types.Scene, now: State, depsgraph: bpy.types.Depsgraph) 
             show_plain(scene, now, maps, depsgraph)
             return
         frame = frames.read(scene, depsgraph, False)
-        if frame.parameters == now.wanted and (now.shows in IN_MEMORY) == maps.is_shown(scene):
+        if wanted_of(frame) == now.wanted and (now.shows in IN_MEMORY) == maps.is_shown(scene):
             return
         if show_frame(scene, now, maps, frame):
             now.cost = time.thread_time() - began
@@ -203,9 +213,13 @@ def _settle(scene: bpy.types.Scene, now: State, maps: ViewportMaps, end: float) 
         while time.perf_counter() < end:
             next(now.steps)
     except StopIteration as done:
-        maps.show(scene, done.value)
-        now.steps, now.disk_of = None, now.wanted
-        if not now.is_full:
+        made, layer = done.value if now.is_full else (None, done.value)
+        if made is not None:
+            maps.show(scene, made)
+        if layer is not None:
+            maps.show_light(scene, layer)
+        now.steps, now.light_of = None, None if now.frame is None else now.frame.light
+        if made is None:
             return PAUSE
         now.shows = Shows.FULL
         return math.inf
@@ -215,23 +229,26 @@ def _settle(scene: bpy.types.Scene, now: State, maps: ViewportMaps, end: float) 
 def _next_step(scene: bpy.types.Scene, now: State, maps: ViewportMaps) -> float:
     """Begin with what is due; if nothing is, return in how many seconds something will be."""
     assert now.frame is not None
-    parameters, age = now.frame.parameters, time.perf_counter() - now.changed_at
-    lags = parameters.disk is not None and now.disk_of != now.wanted
+    light, age = now.frame.light, time.perf_counter() - now.changed_at
+    lags = _lags(now)
     if age >= REST:
         if show_files_of_frame(scene, now, maps):
             return math.inf
-        now.steps, now.is_full = physics.bake_steps(small_maps.full(parameters)), True
-    elif lags and age >= PAUSE_OF_DISK:
-        now.steps, now.is_full = physics.bake_steps(small_maps.small_with_disk(parameters)), False
+        now.steps, now.is_full = full_steps(now.frame), True
+    elif light is not None and lags and age >= PAUSE_OF_DISK:
+        now.steps, now.is_full = light_steps(small_maps.small_light(light)), False
     return (PAUSE_OF_DISK if lags else REST) - age
+
+
+def _lags(now: State) -> bool:
+    light = None if now.frame is None else now.frame.light
+    return light is not None and now.light_of != light
 
 
 def disk_lags(scene: bpy.types.Scene) -> bool:
     """Return whether the disk in the viewport is of an earlier state than the rest."""
     now = _states.find(scene)
-    if now is None or now.shows is not Shows.SMALL or now.frame is None:
-        return False
-    return now.frame.parameters.disk is not None and now.disk_of != now.wanted
+    return now is not None and now.shows is Shows.SMALL and _lags(now)
 
 
 # --- registration ---------------------------------------------------------------------------------

@@ -73,33 +73,15 @@ def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]
     return value_at(hole, SPIN, frame), disk
 
 
-def look_at(hole: bpy.types.Object, frame: float) -> "physics.DiskLook":
+def look_at(hole: bpy.types.Object, frame: float) -> "physics.MatterLook":
     """How the hole's disk looks at a frame."""
     values: dict[str, Any] = {
         name: value_of(hole.umbra.disk, name) if setting.choices else value_at(hole, f"umbra.disk.{name}", frame)
-        for name, setting in physics.DISK_SETTINGS.items()
+        for name, setting in physics.MATTER_SETTINGS.items()
     }
-    return physics.DiskLook(**values)
+    return physics.MatterLook(**values)
 
 
-def pattern_period(scene: bpy.types.Scene, hole: bpy.types.Object) -> float:
-    """How long a pattern of the streaks lives, units of M: one time for the whole animation.
-
-    Where spin or edges have keyframes it is the shortest of all frames, so that no frame shears a pattern further than
-    it should be; with a time of its own for each frame, patterns would hurry or stand still as it changes.
-    """
-    curves = keyframes(hole)
-    if not curves.keys() & {SPIN, INNER, OUTER}:
-        spin, disk = disk_at(hole, scene.frame_current)
-        return physics.disk_pattern_period(spin, *disk.radii(spin), disk.retrograde)
-    periods = []
-    done = set()
-    for frame in range(scene.frame_start, scene.frame_end + 1):
-        spin, disk = disk_at(hole, frame)
-        radii = disk.radii(spin)
-        if (spin, radii) in done:
-            continue
-        done.add((spin, radii))
-        if physics.horizon_radius(spin) < radii[0] < radii[1]:  # frames without a disk are refused when they come
-            periods.append(physics.disk_pattern_period(spin, *radii, disk.retrograde))
-    return min(periods, default=1.0)
+def animated_paths(hole: bpy.types.Object) -> set[str]:
+    """Return the hole's properties that have keyframes, drivers, or strips."""
+    return driven(hole) | keyframes(hole).keys() | in_strips(hole)

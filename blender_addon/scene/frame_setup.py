@@ -5,7 +5,7 @@ Plain functions over evaluated data. Nothing here writes to the scene, except `r
 and back.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -13,10 +13,12 @@ import numpy as np
 from ..core import image_library
 from ..core.errors import SceneError
 from ..core.physics_api import physics
-from ..settings.disk_properties import disk_of
+from ..settings.disk_properties import disk_of, look_of
 from ..settings.hole_properties import CAMERA_ANIMATION, MOTIONS
 from ..settings.scene_properties import tolerances_of
+from ..settings.typed import DiskSettings
 from . import cameras, drivers, instanced_hole, rotations, shutter, velocity
+from .disk_picture import picture_of
 from .enabled import is_enabled
 from .rotations import Matrix, Vector
 from .shutter import Motion
@@ -43,6 +45,9 @@ class FrameSetup:
     """Lens shift of the camera as Blender has it."""
     aperture: float
     """Radius of the camera's aperture, scene units, 0 without depth of field: Cycles' for any but custom cameras."""
+
+    light: "physics.LightParameters | None" = None
+    """What the layer of light of the disk is made from, of the picture's own size; None without a disk."""
 
     motion: Motion = Motion.NONE
     """What camera and hole do while the shutter is open; none without motion blur."""
@@ -308,7 +313,28 @@ def read(
     motion = _motion(scene, (camera, hole), depsgraph, measured, traits)
     data = evaluated_camera.data
     shift = (data.shift_x, data.shift_y)
-    return FrameSetup(scene.frame_current, hole.name, parameters, length_of_m, shift, cameras.aperture(data), motion)
+    return FrameSetup(
+        scene.frame_current,
+        hole.name,
+        parameters,
+        length_of_m,
+        shift,
+        cameras.aperture(data),
+        _light(scene, hole_settings.disk, parameters),
+        motion,
+    )
+
+
+def _light(
+    scene: bpy.types.Scene, disk: DiskSettings, parameters: "physics.WarpMapParameters"
+) -> "physics.LightParameters | None":
+    """Return what the frame's layer of light is made from; its time is that of the frame, at the disk's speed."""
+    if parameters.disk is None:
+        return None
+    time = scene.frame_current_final * scene.render.fps_base / scene.render.fps * disk.turning_speed
+    light = physics.LightParameters(replace(parameters, supersampling=1), look_of(disk), time, picture_of(disk))
+    light.validate()
+    return light
 
 
 def read_at(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings of a hole's accretion disk: `object.umbra.disk`.
 
-Those of its look are the rows of the table `physics.DISK_SETTINGS`.
+Those of its look are the rows of the table `physics.MATTER_SETTINGS`.
 """
 
 from typing import Any
@@ -25,6 +25,9 @@ DENSITY, COLOR = "DENSITY", "COLOR"
 DEFAULT_SPEED = 12.0
 DEFAULT_LOOK = "gargantua"
 
+# Settings that the compositor follows live; all others are in the layer of light.
+LIVE = ("exposure", "tint", "opacity")
+
 
 def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
     """Announce a change.
@@ -36,7 +39,7 @@ def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
 
 
 class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGroup):
-    """A thin disk of matter around the hole. The first six decide what is baked."""
+    """A disk of matter around the hole. The first six are its geometry, `LIVE` what the compositor does."""
 
     FORMER_CHOICES = saved_names.DISK_CHOICES
 
@@ -101,7 +104,7 @@ class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGr
     )
     texture: bpy.props.PointerProperty(
         name="Texture",
-        description="A picture in place of the built-in streaks: azimuth across, so that it should repeat, and the "
+        description="A picture in place of the built-in turbulence: azimuth across, so that it should repeat, and the "
         "logarithm of the radius from the inner edge at the top",
         type=bpy.types.Image,
         update=_changed,
@@ -110,12 +113,31 @@ class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGr
         name="Used As",
         description="What the picture says about the disk",
         items=(
-            (DENSITY, "Streaks", "How dense it is: red thins it by Streaks, green by Clumps", 0),
+            (DENSITY, "Density", "Where it is dense, by its brightness: where it is black there is nothing", 0),
             (COLOR, "Color", "Its colors are the disk's own, not those of hot matter; its alpha is the density", 1),
         ),
         default=DENSITY,
         update=_changed,
         options=set(),
+    )
+    opacity: bpy.props.FloatProperty(
+        name="Opacity",
+        description="Share of the whole disk that is shown, its light and what it hides",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_changed,
+    )
+    tint: bpy.props.FloatVectorProperty(
+        name="Tint",
+        description="Color by which the disk's light is multiplied",
+        default=(1.0, 1.0, 1.0),
+        size=3,
+        min=0.0,
+        soft_max=1.0,
+        subtype="COLOR",
+        update=_changed,
     )
     light: bpy.props.BoolProperty(
         name="Light the Scene",
@@ -132,23 +154,16 @@ class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGr
         soft_max=10.0,
         update=_changed,
     )
-    # What depends on the spin, for drivers.
     innermost_orbit: bpy.props.FloatProperty(
         name="Innermost Stable Orbit",
         description="Radius of the innermost stable orbit of the disk's matter, units of M",
         get=lambda settings: physics.isco_radius(settings.id_data.umbra.spin, prograde=not settings.retrograde),
     )
-    flux_factor: bpy.props.FloatProperty(
-        name="Flux Factor",
-        description="By which Page and Thorne's flux becomes 1 where it is largest",
-        # A driver takes what is below 1e-4 for 0, so it is not the flux itself.
-        get=lambda settings: 1.0 / physics.peak_disk_flux(settings.id_data.umbra.spin, settings.retrograde),
-    )
 
 
 # The rows of the look; a new disk has the default look.
-for _name, _setting in physics.DISK_SETTINGS.items():
-    _default = getattr(physics.DISK_PRESETS[DEFAULT_LOOK], _name)
+for _name, _setting in physics.MATTER_SETTINGS.items():
+    _default = getattr(physics.MATTER_PRESETS[DEFAULT_LOOK], _name)
     UmbraDiskProperties.__annotations__[_name] = property_of(_setting, _changed, _default)
 saved_names.accept(UmbraDiskProperties, saved_names.DISK)
 
@@ -159,7 +174,7 @@ def shows_picture(settings: DiskSettings) -> bool:
 
 
 def disk_of(settings: DiskSettings) -> "physics.Disk | None":
-    """The disk whose passes are baked, or None."""
+    """The disk, or None where it is switched off."""
     if not settings.enabled:
         return None
     return physics.Disk(
@@ -171,20 +186,21 @@ def disk_of(settings: DiskSettings) -> "physics.Disk | None":
 
 
 def value_of(settings: DiskSettings, name: str) -> Any:
-    """Return a setting of the look as the value of the field of `DiskLook`: a str, an int or a float."""
+    """Return a setting of the look as the value of the field of `MatterLook`: a str, an int or a float."""
     value = getattr(settings, name)
-    choices = physics.DISK_SETTINGS[name].choices
+    choices = physics.MATTER_SETTINGS[name].choices
     return next(each.value for each in choices if each.identifier == value) if choices else value
 
 
-def look_of(settings: DiskSettings) -> "physics.DiskLook":
-    """Return how the disk looks."""
-    return physics.DiskLook(**{name: value_of(settings, name) for name in physics.DISK_SETTINGS})
+def look_of(settings: DiskSettings) -> "physics.MatterLook":
+    """Return how the disk looks that is baked: the compositor adds the exposure."""
+    values = {name: value_of(settings, name) for name in physics.MATTER_SETTINGS}
+    return physics.MatterLook(**{**values, "exposure": 0.0})
 
 
-def use_look(settings: DiskSettings, look: "physics.DiskLook") -> None:
+def use_look(settings: DiskSettings, look: "physics.MatterLook") -> None:
     """Set all properties of the look."""
-    for name, setting in physics.DISK_SETTINGS.items():
+    for name, setting in physics.MATTER_SETTINGS.items():
         value = getattr(look, name)
         if value_of(settings, name) != value:
             setattr(settings, name, setting.identifier(value) if setting.choices else value)

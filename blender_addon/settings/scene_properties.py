@@ -196,6 +196,14 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         type=bpy.types.Image,
         update=lambda settings, _context: _refresh(settings),
     )
+    disk_passes: bpy.props.BoolProperty(
+        name="Disk Passes",
+        description="Bake also where the disk's light comes from, a file per image of the disk: radius, azimuth, "
+        "frequency ratio and coverage, for compositing",
+        default=False,
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
     hide_behind: bpy.props.BoolProperty(
         name="Hide Behind the Hole",
         description="Objects behind the hole are hidden where its shadow is in front of them, by the depth pass. "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties made from rows of the tables `physics.DISK_SETTINGS` and `physics.SKY_SETTINGS`."""
+"""Properties made from rows of the tables `physics.MATTER_SETTINGS` and `physics.SKY_SETTINGS`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -32,6 +32,15 @@ def property_of(setting: "physics.Setting", update: Update, default: Any = None)
             default=setting.identifier(default),
             update=update,
             options=set(),
+        )
+    if isinstance(setting.default, int):
+        return bpy.props.IntProperty(
+            name=setting.label,
+            description=setting.sentence,
+            default=default,
+            min=round(setting.low),
+            max=round(setting.high),
+            update=update,
         )
     return bpy.props.FloatProperty(
         name=setting.label,

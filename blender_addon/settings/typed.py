@@ -16,7 +16,7 @@ else:
 
 
 class DiskSettings(_Group):
-    """What `UmbraDiskProperties` holds; of the rows of `physics.DISK_SETTINGS`, those that code asks for by name."""
+    """What `UmbraDiskProperties` holds; of the rows of `physics.MATTER_SETTINGS`, those that code asks for by name."""
 
     enabled: bool
     inner_at_isco: bool
@@ -28,10 +28,15 @@ class DiskSettings(_Group):
     turning_speed: float
     texture: bpy.types.Image | None
     texture_use: str
+    opacity: float
+    tint: tuple[float, float, float]
+    exposure: float
+    thickness: float
+    gap_depth: float
+    spots: int
     light: bool
     light_strength: float
     innermost_orbit: float
-    flux_factor: float
 
 
 class HoleSettings(_Group):
@@ -69,5 +74,6 @@ class SceneSettings(_Group):
     method: str
     environment_source: str
     environment_image: bpy.types.Image | None
+    disk_passes: bool
     hide_behind: bool
     auto_bake: bool

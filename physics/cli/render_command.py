@@ -114,7 +114,7 @@ def run(options: argparse.Namespace) -> None:
             raise WarpMapError(
                 f"{light_path} does not belong to {options.map}; bake it again.", code="map.passes-mixed"
             )
-        image = over_sky(image, layer.light.astype(np.float64), 1.0 - layer.opacity.astype(np.float64))
+        image = over_sky(image, layer.light.astype(np.float64), layer.transmittance.astype(np.float64))
     image = disk_options.draw_disk(options, warp_map, image) if options.disk else image
     with replacing(options.output) as temporary:
         if options.output.suffix.lower() == ".png":

@@ -14,36 +14,35 @@ from ..images.exr import PathLike
 from ..light.matter_settings import MatterLook
 from ..matter.light_layer import LightLayer, LightParameters, layer_hash
 from ..numerics.errors import BlackHoleError, WarpMapError
-from ..shot.map_parameters import WarpMapParameters
 from .companion import path_beside
 from .map_file import MapFormat, advice, made_from_view
 
 
 def _is_made_from(metadata: Mapping[str, Any], wanted: LightParameters) -> bool:
     """Return whether a file was made from these parameters by this version, but for noise."""
-    if not made_from_view(metadata, wanted.view):
-        return False
-    made = _made_from(metadata)
-    return made is not None and wanted.agrees_with({"look": asdict(made.look), "time": made.time})
+    made = _look_of(metadata)
+    return made is not None and made_from_view(metadata, wanted.view) and wanted.agrees_with(made)
 
 
-def _made_from(metadata: Mapping[str, Any]) -> LightParameters | None:
-    """Return what a header says its layer is made from, or None if it is not one of this version, or damaged."""
+def _look_of(metadata: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return what a header says of a layer besides its view, or None if it is not one of this version, or damaged."""
     try:
-        view = WarpMapParameters.from_metadata(metadata["parameters"])
-        made = LightParameters(view, MatterLook(**json.loads(metadata["umbraLook"])), float(metadata["umbraTime"]))
-        made.look.validate()
-    except (BlackHoleError, TypeError, ValueError):
+        look, time = MatterLook(**json.loads(metadata["umbraLook"])), float(metadata["umbraTime"])
+        look.validate()
+    except (BlackHoleError, TypeError, ValueError, RecursionError):
         return None
-    return made if metadata["umbraLayer"] == layer_hash(metadata["hash"], made.look, made.time) else None
+    picture, stated = metadata["umbraPicture"], metadata["umbraLayer"]
+    if stated != layer_hash(metadata["hash"], look, time, picture):
+        return None
+    return {"look": asdict(look), "time": time, "picture": picture, "layer_hash": stated}
 
 
 FORMAT = MapFormat(
     "umbra light",
-    1,
+    2,
     "a layer of light",
-    "R, G, B: light of the disk, linear Rec. 709, premultiplied; A: opacity, 1 less what passes of the light behind",
-    attributes=("umbraLook", "umbraTime", "umbraLayer"),
+    "R, G, B: light of the disk, linear Rec. 709, premultiplied; A: share of the light behind that passes",
+    attributes=("umbraLook", "umbraTime", "umbraPicture", "umbraLayer"),
     is_made_from=_is_made_from,
 )
 
@@ -79,8 +78,8 @@ def write_light_layer(path: PathLike, layer: LightLayer) -> None:
         If the file cannot be written.
     """
     own = layer.metadata
-    planes = (*(np.ascontiguousarray(layer.light[..., channel]) for channel in range(3)), layer.opacity)
-    further = json.dumps(own["look"]), repr(own["time"]), own["layer_hash"]
+    planes = (*(np.ascontiguousarray(layer.light[..., channel]) for channel in range(3)), layer.transmittance)
+    further = json.dumps(own["look"]), repr(own["time"]), own["picture"], own["layer_hash"]
     FORMAT.write(path, planes, own, further)
 
 
@@ -100,14 +99,13 @@ def read_light_layer(path: PathLike) -> LightLayer:
     WarpMapError
         If the file is missing, damaged, cut short, or not a layer of light; the message names it and says which.
     """
-    (red, green, blue, opacity), metadata = FORMAT.read(path)
-    made = _made_from(metadata)
+    (red, green, blue, transmittance), metadata = FORMAT.read(path)
+    made = _look_of(metadata)
     light = np.stack([red, green, blue], axis=-1).astype(np.float32)
-    fits = np.isfinite(light).all() and (light >= 0.0).all() and ((opacity >= 0.0) & (opacity <= 1.0)).all()
+    fits = np.isfinite(light).all() and (light >= 0.0).all() and ((transmittance > 0.0) & (transmittance <= 1.0)).all()
     if not fits or made is None:
         raise WarpMapError(
             advice(f"{path} is damaged: it holds values that no layer of light has."), code="map.damaged"
         )
     own = {name: value for name, value in metadata.items() if name not in FORMAT.attributes}
-    own |= {"look": asdict(made.look), "time": made.time, "layer_hash": metadata["umbraLayer"]}
-    return LightLayer(light, opacity.astype(np.float32), own)
+    return LightLayer(light, transmittance.astype(np.float32), own | made)

@@ -24,12 +24,16 @@ from ..sampling.view import View
 from ..shot.identity import alike
 from ..shot.map_parameters import WarpMapParameters
 from .delays import delays
+from .picture import Picture
 from .surface import Surface
 from .thick_layer import thick_layer_steps
 from .thin_layer import thin_layer
 
 LAYER_VERSION = 2
 """Raised whenever the same parameters and look would give other light."""
+
+LEAST_TRANSMITTANCE = 1e-6
+"""Less is taken for this: 0 is left to files that are missing, which a compositor reads as 0 everywhere."""
 
 LATEST = 1e12
 """Beyond this time, units of M, float64 does not tell the phases of orbits."""
@@ -46,11 +50,14 @@ class LightParameters:
     look : MatterLook
     time : float
         Coordinate time, that of clocks far away, at which the camera takes the picture; units of M. See `clock_rate`.
+    picture : Picture, optional
+        That the disk shows in place of its turbulence.
     """
 
     view: WarpMapParameters
     look: MatterLook
     time: float = 0.0
+    picture: Picture | None = None
 
     def validate(self) -> None:
         """Raise BlackHoleError, with a sentence for the user, when no layer can be made from these parameters."""
@@ -68,13 +75,17 @@ class LightParameters:
     @property
     def hash(self) -> str:
         """SHA-256, in hexadecimal, of the view, the look, the time and the version of what is made from them."""
-        return layer_hash(self.view.hash, self.look, self.time)
+        return layer_hash(self.view.hash, self.look, self.time, self.digest)
+
+    @property
+    def digest(self) -> str:
+        """What the picture is known by; empty without one."""
+        return "" if self.picture is None else self.picture.digest
 
     def agrees_with(self, made: Mapping[str, Any]) -> bool:
-        """Return whether a look and a time, ``look`` and ``time`` of a layer's metadata, are these but for noise."""
-        return alike(
-            {"look": made["look"], "time": made["time"]}, {"look": asdict(self.look), "time": float(self.time)}
-        )
+        """Return whether ``look``, ``time`` and ``picture`` of a layer's metadata are these but for noise."""
+        own = {"look": asdict(self.look), "time": float(self.time), "picture": self.digest}
+        return alike({name: made[name] for name in own}, own)
 
 
 @dataclass(frozen=True)
@@ -83,10 +94,11 @@ class LightLayer:
 
     light: Image
     """Premultiplied linear Rec. 709, shape (height, width, 3), row 0 at the top."""
-    opacity: Image
-    """Share of the light behind that does not pass, shape (height, width), 0 to 1."""
+    transmittance: Image
+    """Share of the light behind that passes, shape (height, width), `LEAST_TRANSMITTANCE` to 1."""
     metadata: dict[str, Any]
-    """``hash`` and ``parameters`` as of a warp map of the same view, ``counts``, ``look``, ``time``, ``layer_hash``."""
+    """``hash`` and ``parameters`` as of a warp map of the same view, ``counts``, ``look``, ``time``, ``picture`` and
+    ``layer_hash``."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -128,7 +140,7 @@ def light_steps(parameters: LightParameters, passes: DiskPasses | None = None) -
     parameters.validate()
     shot, look, time = parameters.view, parameters.look, float(parameters.time)
     assert shot.disk is not None
-    view, surface = View(shot), Surface(look, shot.disk, shot.spin)
+    view, surface = View(shot), Surface(look, shot.disk, shot.spin, parameters.picture)
     if look.thickness > 0.0:
         layer, unresolved = yield from thick_layer_steps(surface, view, shot.map_size, shot.disk, shot.spin, time)
         return _finished(layer, parameters, unresolved)
@@ -149,17 +161,18 @@ def light_steps(parameters: LightParameters, passes: DiskPasses | None = None) -
 
 def _finished(layer: Image, parameters: LightParameters, unresolved: int) -> LightLayer:
     """Return light and what passes, shape (height, width, 4), as a layer with what it is known by."""
-    opacity = np.clip(np.float32(1.0) - layer[..., 3], np.float32(0.0), np.float32(1.0))
+    transmittance = np.clip(layer[..., 3], np.float32(LEAST_TRANSMITTANCE), np.float32(1.0))
     view = parameters.view
     own = {
         "hash": view.hash,
-        "counts": {"covered": int(np.count_nonzero(opacity)), "unresolved": unresolved},
+        "counts": {"covered": int(np.count_nonzero(transmittance < 1.0)), "unresolved": unresolved},
         "parameters": view.to_metadata(),
         "look": asdict(parameters.look),
         "time": float(parameters.time),
+        "picture": parameters.digest,
         "layer_hash": parameters.hash,
     }
-    return LightLayer(np.ascontiguousarray(layer[..., :3]), opacity, own)
+    return LightLayer(np.ascontiguousarray(layer[..., :3]), transmittance, own)
 
 
 class LightBaker:
@@ -188,9 +201,9 @@ class LightBaker:
         return (yield from share_of(light_steps(parameters, passes), share, 1.0))
 
 
-def layer_hash(map_hash: str, look: MatterLook, time: float) -> str:
-    """Return what a layer is known by: SHA-256 of its map's hash, its look and its time, in hexadecimal."""
-    known = {"version": LAYER_VERSION, "map": map_hash, "look": asdict(look), "time": float(time)}
+def layer_hash(map_hash: str, look: MatterLook, time: float, picture: str = "") -> str:
+    """Return what a layer is known by: SHA-256 of its map's hash, look, time and picture, in hexadecimal."""
+    known = {"version": LAYER_VERSION, "map": map_hash, "look": asdict(look), "time": float(time), "picture": picture}
     return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
 
 

@@ -18,6 +18,7 @@ that at the mean of ln T.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from ..light.disk_flux import relative_flux
 from ..light.matter_settings import COLDEST, HOTTEST, MONOCHROMATIC, VISIBLE, MatterLook
 from ..numerics.arrays import Array, Image
 from ..shot.disk import Disk
+from .picture import Picture
 from .rings import COARSE_WIDTH, FINE_WIDTH, TurningRings
 from .rip_map import Levels, Whole
 from .turbulence import fields
@@ -56,15 +58,23 @@ SPOT_SPREAD, SPOT_TURN = 1.2, 0.5 * (math.sqrt(5.0) - 1.0)
 """From spot to spot: the ratio of orbits' radii, and the share of a turn."""
 
 
-FieldLevels = tuple[Levels, Levels]
+class FieldLevels(NamedTuple):
+    """What footprints say about each texture; see `Surface.levels`."""
+
+    fine: Levels
+    coarse: Levels
+    radial: Image
+    """Sides of the footprints, in ln r and radians."""
+    azimuthal: Image
 
 
 class Surface:
     """A disk's matter, ready to be shaded."""
 
-    def __init__(self, look: MatterLook, disk: Disk, spin: float) -> None:
+    def __init__(self, look: MatterLook, disk: Disk, spin: float, picture: Picture | None = None) -> None:
+        """`picture`: in place of the turbulence."""
         look.validate()
-        self.look = look
+        self.look, self.picture = look, picture
         inner, outer = disk.radii(spin)
         self.log_inner, self.log_outer = np.float32(math.log(inner)), np.float32(math.log(outer))
         self._per_log = np.float32((RADII - 1) / math.log(outer / inner))
@@ -98,11 +108,14 @@ class Surface:
         where = spin, (inner, outer)
         self.fine = TurningRings(fine, FINE_WIDTH, *where, int(look.seed), disk.retrograde)
         self.coarse = TurningRings(coarse, COARSE_WIDTH, *where, int(look.seed) + 1, disk.retrograde)
+        # A picture turns as a whole, as matter in its middle does.
+        self._omega = float(orbital_frequency(spin, np.array([math.sqrt(inner * outer)]), disk.retrograde)[0])
         self._spots = _spots(look, spin, disk.retrograde)
 
     def levels(self, radial: Image, azimuthal: Image) -> FieldLevels:
         """Return the levels of both fields for footprints of these sides, in ln r and radians."""
-        return self.fine.field.levels(radial, azimuthal), self.coarse.field.levels(radial, azimuthal)
+        fine, coarse = (each.field.levels(radial, azimuthal) for each in (self.fine, self.coarse))
+        return FieldLevels(fine, coarse, radial, azimuthal)
 
     def radial(self, table: Image, log_radius: Image) -> Image:
         """Return a table by radius at places."""
@@ -127,7 +140,9 @@ class Surface:
         levels : tuple
             From `levels`.
         """
-        fine, coarse = levels
+        if self.picture is not None:
+            return self._pictured(self.picture, log_radius, phi, log_g, time, delay, levels)
+        fine, coarse = levels.fine, levels.coarse
         strands = self.fine.at(log_radius, phi, time, delay, fine)
         clouds = self.coarse.at(log_radius, phi, time, delay, coarse)
         heat = strands.real * self.contrast[0, 0] + clouds.real * self.contrast[1, 0]
@@ -142,7 +157,33 @@ class Surface:
         depth = self.radial(self.depth, log_radius) * np.exp(dense)
         return self._light(log_radius, log_g, heat, lost_heat), depth, np.expm1(lost_dense)
 
-    def _light(self, log_radius: Image, log_g: Image, heat: Image, lost: Image) -> Image:
+    def _pictured(
+        self,
+        picture: Picture,
+        log_radius: Image,
+        phi: Image,
+        log_g: Image,
+        time: float,
+        delay: Image | None,
+        levels: FieldLevels,
+    ) -> tuple[Image, Image, Image]:
+        """Return what `emission` does for a disk that shows a picture, which turns as matter in its middle does."""
+        azimuth = phi - np.float32((self._omega * time) % (2.0 * math.pi))
+        if delay is not None:
+            azimuth += np.float32(self._omega) * delay
+        span = np.float32(self.log_outer - self.log_inner)
+        place = (log_radius - self.log_inner) / span
+        seen = picture.at(place, azimuth, levels.radial / span, levels.azimuthal)
+        none = np.zeros(len(phi), dtype=np.float32)
+        own = picture.colors(seen) if picture.is_color else None
+        light = self._light(log_radius, log_g, none, none, own)
+        return light, self.radial(self.depth, log_radius) * picture.density(seen), none
+
+    def _light(
+        self, log_radius: Image, log_g: Image, heat: Image, lost: Image, own_color: Image | None = None
+    ) -> Image:
+        """Return light, shape (n, 4), with 0 last, of the color of its temperature, or of a color of its own, which the
+        shift changes as it changes that of the hottest matter."""
         bright = self.radial(self._bright, log_radius) + heat
         bright += log_g * self._bright_power
         if self._is_one:
@@ -151,6 +192,10 @@ class Surface:
             tint = self.radial(self._tint, log_radius) + heat
             tint += log_g * self._tint_power
         light: Image = self._colors.take(_place(tint), axis=0)
+        if own_color is not None:
+            hottest = np.float32(math.log(self.look.temperature))
+            light = self._colors.take(_place(hottest + log_g * self._tint_power), axis=0)
+            light[:, :3] *= own_color / self._colors[_place(hottest[None]), :3]
         power = np.float32(WIEN) * np.exp(-bright) if self.look.band == VISIBLE else np.float32(BOLOMETRIC_POWER)
         gain = np.exp(np.minimum(np.float32(0.5) * power * power * lost, np.float32(MOST_LOST_GAIN)))
         gain *= self._luminance.take(_place(bright))

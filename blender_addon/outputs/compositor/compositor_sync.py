@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 
 from ...bake.folder import folder
-from ...bake.kinds import WARP_MAP
+from ...bake.kinds import LIGHT_LAYER, WARP_MAP
 from ...bake.names import sequence_path
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
@@ -16,7 +16,7 @@ from ...scene.sky.node_paths import Place
 from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import FOOTPRINT, Setup, find_node, find_setup, find_tree, takes_sky_from_settings
-from ..shared.map_images import NO_MAP, file_image, plain_map, read_sequence
+from ..shared.map_images import NO_MAP, file_image, plain_layer, plain_map, read_sequence
 from . import depth, disk, sky_filter
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
@@ -71,7 +71,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
 
 
 def point_at_maps(scene: bpy.types.Scene) -> None:
-    """Let the map node read the scene's maps of the current resolution.
+    """Let the nodes read the scene's maps, and layers of light, of the current resolution.
 
     Raises
     ------
@@ -82,25 +82,27 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
     samples = int(scene.umbra.supersampling)
     width, height = cameras.render_size(scene.render)
     size = (width * samples, height * samples)
-    _set_map_path(scene, sequence_path(scene, hole.name, size, WARP_MAP))
+    light = sequence_path(scene, hole.name, (width, height), LIGHT_LAYER)
+    _set_paths(scene, sequence_path(scene, hole.name, size, WARP_MAP), light)
 
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
-    """Let the map node read no map at all: the picture is magenta until a valid map is in place."""
-    _set_map_path(scene, folder(scene).blender_path + NO_MAP)
+    """Let the nodes read no map at all: the picture is magenta until a valid map is in place."""
+    nothing = folder(scene).blender_path + NO_MAP
+    _set_paths(scene, nothing, nothing)
 
 
 def point_at_plain_map(scene: bpy.types.Scene) -> None:
-    """Let the map node read, at this frame, a map that bends nothing, and no disk."""
-    _set_map_path(scene, plain_map(scene.frame_current))
+    """Let the nodes read, at this frame, a map that bends nothing, and no disk."""
+    _set_paths(scene, plain_map(scene.frame_current), plain_layer(scene.frame_current))
 
 
-def _set_map_path(scene: bpy.types.Scene, path: str) -> None:
+def _set_paths(scene: bpy.types.Scene, path: str, light_path: str) -> None:
     setup = find_setup(scene)
     if setup is None or setup.map is None:
         return
     read_sequence(setup.map, MAP_IMAGE_NAME, path)
-    disk_sync.point_passes(setup.tree, path)
+    disk_sync.point_at(setup.tree, light_path)
     sky_filter.point_at_footprints(setup.tree, path)
 
 
@@ -114,13 +116,13 @@ def forget_loaded_map(scene: bpy.types.Scene) -> None:
 
 
 def map_nodes(scene: bpy.types.Scene) -> list[bpy.types.Node]:
-    """Return the nodes that read maps: the warp map's first, if it is there, then what lies beside it."""
+    """Return the nodes that read maps: the warp map's first, if it is there, then those of what lies beside it."""
     setup, tree = find_setup(scene), find_tree(scene)
     if tree is None:
         return []
     footprint = find_node(tree, FOOTPRINT)
-    beside = [node for node, _crossing in disk_sync.passes_of(tree)] + ([] if footprint is None else [footprint])
-    return beside if setup is None or setup.map is None else [setup.map, *beside]
+    found = [None if setup is None else setup.map, footprint, find_node(tree, disk_sync.LAYER)]
+    return [node for node in found if node is not None]
 
 
 def sync_sky(scene: bpy.types.Scene) -> None:

@@ -2,6 +2,7 @@
 """Output: Compositor, as the rest of the add-on knows it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import bpy
 
@@ -202,8 +203,11 @@ class CompositorOutput(Output):
         return True
 
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
-        """Return the frame's warp map."""
-        return [request(scene, frame, WARP_MAP, frame.parameters)]
+        """Return the frame's warp map, and its layer of light if it has a disk."""
+        view = frame.parameters if scene.umbra.disk_passes else replace(frame.parameters, disk=None)
+        needed = [request(scene, frame, WARP_MAP, view)]
+        light = disk_sync.request_of(scene, frame)
+        return needed if light is None else [*needed, light]
 
     def begin_render(self, scene: bpy.types.Scene) -> None:
         """Mend what was changed by hand inside the set-up; refuse what cannot be mended."""
@@ -234,10 +238,11 @@ class CompositorOutput(Output):
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let the group read the frame's map."""
-        (wanted,) = self.map_requests(scene, frame)
+        wanted, *others = self.map_requests(scene, frame)
         warnings = _unresolved(wanted, frame)
+        for other in others:
+            warnings += disk_sync.unresolved(other)
         compositor_sync.check_frame(scene)
-        disk_sync.check_shot(scene, frame.parameters)
         compositor_sync.point_at_maps(scene)
         return warnings
 

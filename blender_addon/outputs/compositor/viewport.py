@@ -13,7 +13,7 @@ from . import compositor_sync
 
 
 class CompositorViewportMaps:
-    """The warp map, and the passes of its disk, each in an image of its own in place of the files."""
+    """The warp map, and the layer of light of the disk, each in an image of its own in place of the files."""
 
     def can_show(self, scene: bpy.types.Scene) -> bool:
         """Return whether the group is in the scene's compositor, switched on, and can be changed."""
@@ -25,7 +25,7 @@ class CompositorViewportMaps:
         return setup is not None and setup.map is not None and is_live(setup.map)
 
     def show(self, scene: bpy.types.Scene, made: "physics.WarpMap") -> None:
-        """Let the group read a map, and the disk's group its passes."""
+        """Let the group read a map."""
         setup = _setup(scene)
         if setup is None or setup.map is None:
             return
@@ -33,15 +33,17 @@ class CompositorViewportMaps:
         footprint = find_node(setup.tree, FOOTPRINT)
         if footprint is not None:
             show_live(footprint, pixels_of(*np.moveaxis(physics.footprint(made).astype(np.float32), -1, 0)))
-        for node, crossing in disk_sync.passes_of(setup.tree):
-            if crossing <= len(made.disk_passes):
-                one = made.disk_passes[crossing - 1]
-                show_live(node, pixels_of(one.radius, one.phi, one.g, one.coverage))
 
-    def has_disk(self, scene: bpy.types.Scene) -> bool:
-        """Return whether all passes that the disk's group reads are in memory."""
-        setup = _setup(scene)
-        return setup is not None and all(is_live(node) for node, _crossing in disk_sync.passes_of(setup.tree))
+    def show_light(self, scene: bpy.types.Scene, layer: "physics.LightLayer") -> None:
+        """Let the group read a layer of light."""
+        node = _layer_node(scene)
+        if node is not None:
+            show_live(node, pixels_of(*disk_sync.planes_of(layer)))
+
+    def has_light(self, scene: bpy.types.Scene) -> bool:
+        """Return whether a layer of light that the group reads is in memory."""
+        node = _layer_node(scene)
+        return node is None or is_live(node)
 
     def show_again(self, scene: bpy.types.Scene) -> bool:
         """Let the nodes read the maps in memory that they had; return whether the group has one."""
@@ -66,6 +68,11 @@ class CompositorViewportMaps:
         """Let the nodes read files, and free the images in memory."""
         for node in compositor_sync.map_nodes(scene):
             drop_live(node)
+
+
+def _layer_node(scene: bpy.types.Scene) -> bpy.types.Node | None:
+    setup = _setup(scene)
+    return None if setup is None else find_node(setup.tree, disk_sync.LAYER)
 
 
 def _setup(scene: bpy.types.Scene) -> Setup | None:

@@ -78,7 +78,7 @@ def warnings(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: fram
     if frame.parameters.disk is not None and not lens_disk.is_in_use(scene):
         sentences.append(
             f'The disk of "{frame.hole_name}" is not drawn: switch Compositing on in Output Properties, and connect '
-            "the Image of the node Umbra Disk in the Compositor."
+            "the Image of the node Umbra Disk Light in the Compositor."
         )
     if found.inside:
         radius = scene.umbra.sphere_radius

@@ -10,11 +10,11 @@ from ..shared.compositor_tree import ROLE, find_node, find_tree, has_scene_tree
 BEFORE = "umbra_lens_tree_before"
 
 FOREGROUND_LAYER, FOREGROUND_OVER = "foreground_layer", "foreground_over"
-_OURS = (disk_sync.DISK, FOREGROUND_LAYER, FOREGROUND_OVER)
+_OURS = (disk_sync.DISK, disk_sync.LAYER, FOREGROUND_LAYER, FOREGROUND_OVER)
 
 _SETTINGS = {
     "use_compositing": True,
-    "compositor_precision": "FULL",  # half floats cannot hold the radii and angles of a disk's passes
+    "compositor_precision": "FULL",  # half floats lose the dim light of a disk
 }
 
 

@@ -83,7 +83,7 @@ class LensOutput(Output):
         return leaving.is_left(scene)
 
     def refresh(self, scene: bpy.types.Scene) -> None:
-        """Let the viewport see the scene as it stands, and the disk read the passes of the settings."""
+        """Let the viewport see the scene as it stands, and the disk read the layers of the settings."""
         lens_sync.show_live(scene)
         try:
             lens_sky.refresh(scene)
@@ -106,15 +106,14 @@ class LensOutput(Output):
         return lens_tree.BEFORE in scene
 
     def needs_maps(self, scene: bpy.types.Scene) -> bool:
-        """Return whether the lens looks its rays up, or its disk has passes."""
+        """Return whether the lens looks its rays up, or its disk has layers."""
         return lens_sync.uses_maps(scene) or lens_disk.is_in_use(scene)
 
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
-        """Return the frame's exit map, and the warp map whose passes are drawn."""
+        """Return the frame's exit map, and the layer of light of its disk."""
         needed = [_exit_map(scene, frame)] if lens_sync.uses_maps(scene) else []
-        if frame.parameters.disk is not None and lens_disk.is_in_use(scene):
-            needed.append(lens_disk.request_of(scene, frame))
-        return needed
+        light = lens_disk.request_of(scene, frame) if lens_disk.is_in_use(scene) else None
+        return needed if light is None else [*needed, light]
 
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Return the frame's exit map."""
@@ -145,9 +144,10 @@ class LensOutput(Output):
         """Give the camera the frame's parameters and its map."""
         world_files.check(scene)
         if lens_disk.is_in_use(scene):
-            disk_sync.check_shot(scene, frame.parameters)
-            lens_disk.point_at_passes(scene)
+            lens_disk.point_at_layers(scene)
         warnings = lens_objects.warnings(scene, depsgraph, frame)
+        light = lens_disk.request_of(scene, frame) if lens_disk.is_in_use(scene) else None
+        warnings += [] if light is None else disk_sync.unresolved(light)
         if scene.umbra.foreground_scene is not None:
             camera = cameras.active_camera(scene).evaluated_get(depsgraph)
             foreground.copy_lens(scene.umbra.foreground_scene, camera.data)
@@ -176,7 +176,7 @@ class LensOutput(Output):
     def end_render(self, scene: bpy.types.Scene, *, canceled: bool) -> None:
         """Let the viewport see the scene again, which needs no map."""
         if canceled:
-            lens_disk.point_at_passes(scene)
+            lens_disk.point_at_layers(scene)
         device = _devices.drop(scene)
         if device is not None:
             scene.cycles.device = device
@@ -189,13 +189,13 @@ class LensOutput(Output):
     # --- files ------------------------------------------------------------------------------------
 
     def point_at_files(self, scene: bpy.types.Scene) -> None:
-        """Let the disk read the passes of the settings that are saved."""
-        lens_disk.point_at_passes(scene)
+        """Let the disk read the layers of the settings that are saved."""
+        lens_disk.point_at_layers(scene)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
-        """Let Blender read the passes from their files again."""
-        lens_disk.point_at_passes(scene)
-        lens_disk.forget_loaded_passes(scene)
+        """Let Blender read the layers from their files again."""
+        lens_disk.point_at_layers(scene)
+        lens_disk.forget_loaded_layers(scene)
 
     def carrier(self, scene: bpy.types.Scene) -> FrameCarrier | None:
         """Return what carries the camera's parameters into each frame."""

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A glowing mesh in the place of the disk that lights the scene's objects, and that no camera sees.
 
-It gives off the light of the disk at rest, as the picture would show it without streaks: to be as bright as what
-is seen is all that "matched" can mean, for the picture's brightness is the artist's to choose.
+It gives off the light of the disk at rest, averaged over its turbulence: to be as bright as what is seen is all that
+"matched" can mean, for the picture's brightness is the artist's to choose. A thick disk is a closed surface.
 """
 
 import math
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core import color_spaces
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.physics_api import physics
-from ...nodes import disk_images
-from ...scene import disk_animation, frame_setup
-from ...settings import disk_properties
+from ...scene import disk_animation, disk_picture, frame_setup
 
 NAME = "Umbra Disk Light"
 MARK = "umbra_disk_light"
@@ -25,8 +22,6 @@ _ATTRIBUTE = "Light"
 _STRENGTH = "Strength"
 
 RINGS, SEGMENTS = 48, 96
-
-Array = NDArray[np.float64]
 
 
 def find(hole: bpy.types.Object | None) -> bpy.types.Object | None:
@@ -57,10 +52,11 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     light = present or _add(scene, hole)
     if light.animation_data is None:  # made by version 0.1.0
         _hide_with(hole, light)
-    picture = settings.texture if disk_properties.shows_picture(settings) else None
-    made_from = repr((spin, disk, look, None if picture is None else (picture.name, tuple(picture.size))))
+    picture = disk_picture.picture_of(settings)
+    tint = tuple(settings.tint)
+    made_from = repr((spin, disk, look, tint, "" if picture is None else picture.digest))
     if light.data.get(_MADE_FROM) != made_from:
-        _fill(light.data, disk, look, spin, None if picture is None else disk_images.mean_of_rows(picture))
+        _fill(light.data, disk, look, spin, tint, picture)
         light.data[_MADE_FROM] = made_from
     scale = disk_animation.value_at(hole, "umbra.mass_scale", frame)
     if not all(math.isclose(each, scale, rel_tol=1e-6) for each in light.scale):
@@ -69,7 +65,10 @@ def refresh(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
     if material is None:
         return
     strength = material.node_tree.nodes[_STRENGTH].inputs["Strength"]
-    wanted = disk_animation.value_at(hole, "umbra.disk.light_strength", frame)
+    wanted, exposure, opacity = (
+        disk_animation.value_at(hole, f"umbra.disk.{name}", frame) for name in ("light_strength", "exposure", "opacity")
+    )
+    wanted *= 2.0**exposure * opacity
     if not math.isclose(strength.default_value, wanted, rel_tol=1e-6, abs_tol=1e-9):
         strength.default_value = wanted
 
@@ -80,47 +79,35 @@ def follow(scene: bpy.types.Scene, hole: bpy.types.Object | None) -> None:
         refresh(scene, hole)
 
 
-def radiance(
-    disk: "physics.Disk", look: "physics.DiskLook", spin: float, radius: Array, rows: Array | None = None
-) -> Array:
-    """Light of the disk at rest times its opacity, with streaks and clumps at their mean, shape (n, 3).
-
-    `rows`, shape (rows, 4), are the means round the disk of the picture whose colors it has.
-    """
-    if rows is not None:
-        inner, outer = disk.radii(spin)
-        depth = np.log(radius / inner) / np.log(outer / inner)
-        places = (np.arange(len(rows)) + 0.5) / len(rows)
-        mean = np.stack([np.interp(depth, places, channel) for channel in rows.T], axis=-1)
-        light = physics.tinted_disk_light(look, disk, spin, radius, np.ones_like(radius), mean[:, :3])
-        return light * (look.opacity * physics.disk_fade(look, disk, spin, radius))[:, None]
-    mean = np.full((*radius.shape, 2), 0.5)
-    thick = physics.disk_density(look, disk, spin, radius, mean)
-    opacity = look.opacity * np.minimum(thick * physics.DISK_OPACITY_REACH, 1.0)
-    light = physics.disk_emission(look, disk, spin, radius, np.ones_like(radius))
-    shown: Array = light * (thick ** (look.gain - 1.0) * opacity)[..., None]
-    return shown
-
-
 def _fill(
-    mesh: bpy.types.Mesh, disk: "physics.Disk", look: "physics.DiskLook", spin: float, rows: Array | None
+    mesh: bpy.types.Mesh,
+    disk: "physics.Disk",
+    look: "physics.MatterLook",
+    spin: float,
+    tint: tuple[float, ...],
+    picture: "physics.Picture | None",
 ) -> None:
-    """Make the annulus, in units of M, its light at each vertex."""
+    """Make the surface, in units of M, its light at each vertex."""
     radii = np.geomspace(*disk.radii(spin), RINGS)
+    heights = np.zeros(RINGS)
+    if look.thickness > 0.0:  # up along the inner rim, out over the top, and back along the bottom
+        tall = radii * look.thickness * (radii / radii[0]) ** look.flare
+        radii = np.concatenate([radii, radii[::-1], radii[:1]])
+        heights = np.concatenate([tall, -tall[::-1], tall[:1]])
+    rings = len(radii)
     angles = np.arange(SEGMENTS) * (2.0 * math.pi / SEGMENTS)
     around = np.stack([np.cos(angles), np.sin(angles), np.zeros(SEGMENTS)], axis=-1)
-    places = (radii[:, None, None] * around).reshape(-1, 3)
-    ring, segment = np.divmod(np.arange((RINGS - 1) * SEGMENTS), SEGMENTS)
+    places = radii[:, None, None] * around
+    places[..., 2] = heights[:, None]
+    ring, segment = np.divmod(np.arange((rings - 1) * SEGMENTS), SEGMENTS)
     after = (segment + 1) % SEGMENTS
     corners = np.stack([ring * SEGMENTS + segment, (ring + 1) * SEGMENTS + segment], axis=-1)
     others = np.stack([(ring + 1) * SEGMENTS + after, ring * SEGMENTS + after], axis=-1)
     mesh.clear_geometry()
-    mesh.from_pydata(places.tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
-    colors = np.ones((RINGS, SEGMENTS, 4), np.float32)
-    light = radiance(disk, look, spin, radii, rows)
-    if rows is None:  # a picture's colors are scene-linear already
-        light = color_spaces.to_scene_linear(light)
-    colors[..., :3] = light[:, None, :]
+    mesh.from_pydata(places.reshape(-1, 3).tolist(), [], np.concatenate([corners, others], axis=-1).tolist())
+    colors = np.ones((rings, SEGMENTS, 4), np.float32)
+    light = color_spaces.to_scene_linear(physics.disk_radiance(look, disk, spin, radii, picture))
+    colors[..., :3] = (light * np.array(tint))[:, None, :]
     attribute = mesh.attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "POINT")
     attribute.data.foreach_set("color", colors.ravel())
     mesh.update()

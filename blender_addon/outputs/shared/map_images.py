@@ -22,7 +22,7 @@ from ...core.physics_api import physics
 NO_MAP = "no_warp_map_0001.exr"
 
 # Of a map that bends nothing: every pixel is valid and sees the same place of the sky.
-_PLAIN_MAP = "umbra_plain_map"
+_PLAIN_MAP, _PLAIN_LAYER = "umbra_plain_map", "umbra_plain_layer"
 _PLAIN = (0.5 * math.pi, 1.0, 1.0, 1.0)  # theta, phi, 1 + z, visibility
 
 # The custom property of a live image, and how its name begins.
@@ -44,43 +44,49 @@ def map_image(name: str) -> bpy.types.Image:
     image = bpy.data.images.new(name, 1, 1, float_buffer=True)
     image.source = "SEQUENCE"
     image.filepath = NO_MAP
-    keep_as_data(image)
     return image
 
 
-def keep_as_data(image: bpy.types.Image) -> None:
-    """Let Blender read a map's numbers as they are, whatever its image was set to by hand."""
-    color_spaces.mark_as_data(image)
+def keep_as_data(image: bpy.types.Image, *, is_light: bool = False) -> None:
+    """Let Blender read a map's numbers as they are, whatever its image was set to by hand; light as linear Rec.709."""
+    if not (is_light and color_spaces.mark_as_linear_rec709(image)):
+        color_spaces.mark_as_data(image)
     if image.alpha_mode != "CHANNEL_PACKED":  # alpha is data, not a mask of the other channels
         image.alpha_mode = "CHANNEL_PACKED"
     if image.use_half_precision:
         image.use_half_precision = False
 
 
-def read_sequence(node: bpy.types.Node, name: str, path: str) -> None:
-    """Let an image node read one file for each frame."""
+def read_sequence(node: bpy.types.Node, name: str, path: str, *, is_light: bool = False) -> None:
+    """Let an image node read one file for each frame, of numbers or of light."""
     give_back(node)
     if node.image is None or node.image.source != "SEQUENCE":
         node.image = map_image(name)
     for name, value in SEQUENCE_SETTINGS.items():
         if getattr(node, name) != value:
             setattr(node, name, value)
-    keep_as_data(node.image)
+    keep_as_data(node.image, is_light=is_light)
     if node.image.filepath != path:
         node.image.filepath = path
 
 
 def plain_map(frame: int) -> str:
-    """Return the path of a map for a frame without a black hole, with passes of a disk that is nowhere.
+    """Return the path of a map for a frame without a black hole.
 
     They lie in Blender's temporary folder, and are written when they are first needed.
     """
     folder = Path(bpy.app.tempdir or tempfile.gettempdir())
     path = folder / f"{_PLAIN_MAP}_{frame % SEQUENCE_LENGTH:04d}.exr"
     if not path.is_file():
-        for number in range(1, physics.MOST_CROSSINGS + 1):
-            physics.write_exr(physics.pass_path(path, number), np.zeros((2, 2, 4), np.float32))
         physics.write_exr(path, np.full((2, 2, 4), _PLAIN, np.float32))
+    return str(path)
+
+
+def plain_layer(frame: int) -> str:
+    """Return the path of a layer of light for a frame without a black hole: there is none, and all passes."""
+    path = Path(plain_map(frame)).with_name(f"{_PLAIN_LAYER}_{frame % SEQUENCE_LENGTH:04d}.exr")
+    if not path.is_file():
+        physics.write_exr(path, np.full((2, 2, 4), (0.0, 0.0, 0.0, 1.0), np.float32))
     return str(path)
 
 

@@ -20,7 +20,7 @@ def views():
 def test_looks_are_within_the_screen_and_have_more_than_one_hue(views, name):
     for view in views:
         layer = rendered(view, MATTER_PRESETS[name])
-        seen = layer.opacity > 0.05
+        seen = (1.0 - layer.transmittance) > 0.05
         light = layer.light[seen]
         assert (light.max(axis=1) > 1.0).mean() <= 0.03
         bright = light @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -48,7 +48,7 @@ def test_gaps_and_infalling_gas():
     baked = physics.bake(bare)
     radius, covered = baked.disk_passes[0].radius, baked.disk_passes[0].coverage == 1.0
     look = MatterLook(strands=0.0, smoke=0.0, gap_radius=10.0, gap_width=0.1, gap_depth=1.0)
-    opacity = rendered(baked, look).opacity
+    opacity = 1.0 - rendered(baked, look).transmittance
     assert opacity[covered & (np.abs(radius - 10.0) < 0.2)].max() < 0.05
     assert opacity[covered & (np.abs(radius - 7.0) < 0.5)].min() > 0.7
     isco = physics.isco_radius(0.9)

@@ -68,9 +68,9 @@ def test_a_layer_of_no_height_is_the_thin_disk():
     whole &= baked.disk_passes[0].coverage == 1.0
     error = np.abs(thick.light - thin[..., :3])[whole].sum() / thin[..., :3][whole].sum()
     assert error < 0.01
-    assert np.abs(thick.opacity - 1.0 + thin[..., 3])[whole].mean() < 0.01
+    assert np.abs(thick.transmittance - thin[..., 3])[whole].mean() < 0.01
     nothing = np.logical_and.reduce([each.coverage == 0.0 for each in baked.disk_passes])
-    assert (thick.opacity[nothing] > 0.05).mean() < 0.01
+    assert ((1.0 - thick.transmittance)[nothing] > 0.05).mean() < 0.01
 
 
 def test_light_is_steady_while_the_camera_crosses_the_plane_inside_the_layer():
@@ -90,6 +90,6 @@ def test_the_torus_is_thick_and_counts_what_it_leaves_out():
     baked = physics.bake(shot(96, 54, 5.0))
     layer = rendered(baked, MATTER_PRESETS["torus"])
     thin = rendered(baked, dataclasses.replace(MATTER_PRESETS["torus"], thickness=0.0))
-    assert (layer.opacity > 0.5).sum() > 1.3 * (thin.opacity > 0.5).sum()
+    assert ((1.0 - layer.transmittance) > 0.5).sum() > 1.3 * ((1.0 - thin.transmittance) > 0.5).sum()
     assert np.isfinite(layer.light).all()
-    assert 0 <= layer.counts["unresolved"] < 0.01 * layer.opacity.size
+    assert 0 <= layer.counts["unresolved"] < 0.01 * (1.0 - layer.transmittance).size
