@@ -29,7 +29,7 @@ from ..outputs.shared import disk_light
 from ..preview import live_preview, viewport
 from ..scene import frame_setup, presence
 from ..scene.placement import placement
-from ..settings import saved_names
+from ..settings import former_disks, saved_names
 
 Handler = TypeVar("Handler", bound=Callable[..., None])
 persistent: Callable[[Handler], Handler] = bpy.app.handlers.persistent
@@ -383,6 +383,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
     viewport.forget()
     viewport.drop()  # a file that Blender has saved by itself has what was shown
     saved_names.migrate()
+    former_disks.bring_up_to_date()
     for scene in bpy.data.scenes:
         if scene.library is None:
             saving.on_load(scene)
@@ -395,6 +396,7 @@ def on_load_post(_path: str = "", _unused: object = None) -> None:
 def on_import_post(_imported: object = None, _unused: object = None) -> None:
     """Data of another file was linked or appended."""
     saved_names.migrate()
+    former_disks.bring_up_to_date()
 
 
 @persistent

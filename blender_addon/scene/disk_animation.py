@@ -74,12 +74,12 @@ def disk_at(hole: bpy.types.Object, frame: float) -> "tuple[float, physics.Disk]
 
 
 def look_at(hole: bpy.types.Object, frame: float) -> "physics.MatterLook":
-    """How the hole's disk looks at a frame."""
+    """How the hole's disk looks at a frame; its exposure is not a part of that, see `disk_properties.look_of`."""
     values: dict[str, Any] = {
         name: value_of(hole.umbra.disk, name) if setting.choices else value_at(hole, f"umbra.disk.{name}", frame)
         for name, setting in physics.MATTER_SETTINGS.items()
     }
-    return physics.MatterLook(**values)
+    return physics.MatterLook(**{**values, "exposure": 0.0})
 
 
 def animated_paths(hole: bpy.types.Object) -> set[str]:

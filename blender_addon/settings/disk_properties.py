@@ -12,6 +12,7 @@ from ..core import changes
 from ..core.changes import Change
 from ..core.physics_api import physics
 from . import saved_names
+from .former_disks import CURRENT
 from .table_properties import property_of
 from .typed import DiskSettings
 
@@ -35,6 +36,8 @@ def _changed(settings: "UmbraDiskProperties", _context: object) -> None:
     Every property has this as its update function: without one, Blender does not carry a script's new value into
     evaluated data.
     """
+    if settings.look_version != CURRENT:
+        settings.look_version = CURRENT
     changes.notify(Change.DISK, settings.id_data)
 
 
@@ -153,6 +156,12 @@ class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGr
         min=0.0,
         soft_max=10.0,
         update=_changed,
+    )
+    look_version: bpy.props.IntProperty(
+        name="Version of the Look",
+        description="Which version of the add-on the settings are of; see `former_disks`",
+        default=0,
+        options={"HIDDEN"},
     )
     innermost_orbit: bpy.props.FloatProperty(
         name="Innermost Stable Orbit",

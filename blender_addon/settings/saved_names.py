@@ -75,7 +75,7 @@ def _setter(name: str) -> Any:
     def store(settings: bpy.types.PropertyGroup, value: float) -> None:
         # Not by the property: its update function must not run where Blender evaluates an animated alias.
         limits = settings.bl_rna.properties[name]
-        _storage(settings, create=True)[name] = min(max(value, limits.hard_min), limits.hard_max)
+        storage_of(settings, create=True)[name] = min(max(value, limits.hard_min), limits.hard_max)
 
     return store
 
@@ -96,10 +96,10 @@ class AcceptsFormerChoices:
 def migrate() -> None:
     """Replace former names wherever the file that is open has them; linked data in memory only."""
     for scene in bpy.data.scenes:
-        _rename_keys(_group(_storage(scene), "umbra"), SCENE)
-        _rename_keys(_group(scene.get(_REMEMBERED), _LOOK), SOCKETS)
+        _rename_keys(group_in(storage_of(scene), "umbra"), SCENE)
+        _rename_keys(group_in(scene.get(_REMEMBERED), _LOOK), SOCKETS)
     for each in bpy.data.objects:
-        _rename_keys(_group(_group(_storage(each), "umbra"), "disk"), DISK)
+        _rename_keys(group_in(group_in(storage_of(each), "umbra"), "disk"), DISK)
     for tree in bpy.data.node_groups:
         if any(key.startswith(_STAMPS) for key in tree.keys()):  # noqa: SIM118  a tree has no iterator of its own
             _rename_sockets(tree)
@@ -121,12 +121,13 @@ def migrate() -> None:
             _rename_animation(animation, block)
 
 
-def _storage(owner: Any, *, create: bool = False) -> Any:
-    """Where Blender keeps the values of an owner's registered properties, by name; None where it has none."""
+def storage_of(owner: Any, *, create: bool = False) -> Any:
+    """Return where Blender keeps the values of an owner's registered properties, by name; None where it has none."""
     return owner.bl_system_properties_get(do_create=create) if PROPERTIES_ARE_APART else owner
 
 
-def _group(parent: Any, key: str) -> Any:
+def group_in(parent: Any, key: str) -> Any:
+    """Return the group of values under a key; None where there is none."""
     found = None if parent is None else parent.get(key)
     return found if hasattr(found, "keys") else None
 

@@ -36,6 +36,7 @@ class DiskSettings(_Group):
     spots: int
     light: bool
     light_strength: float
+    look_version: int
     innermost_orbit: float
 
 

@@ -111,7 +111,8 @@ def build(*, disk: bool, animated: bool = False) -> bpy.types.Scene:
         hole.umbra.disk.texture = scene.umbra.environment_image  # the built-in one would make the file large
         hole.umbra.disk.enabled = True
         hole.umbra.disk.temperature = 7000.0
-        hole.umbra.disk.streaks = 0.25
+        if "streaks" in hole.umbra.disk.bl_rna.properties:  # up to version 0.1
+            hole.umbra.disk.streaks = 0.25
     _finish_compositor(scene)
     if animated:
         _animate(scene)

@@ -35,51 +35,62 @@ def bake() -> None:
     assert bpy.ops.umbra.bake_frame() == {"FINISHED"}
 
 
-def test_passes_lie_beside_the_map_and_hold(
+MAP, LAYER = "Scene_Black_Hole_48x27_0001.exr", "Scene_Black_Hole_48x27_light_0001.exr"
+
+
+def test_the_layer_is_a_file_of_its_own(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     bake()
-    assert list(files(tmp_path)) == [
-        "Scene_Black_Hole_48x27_0001.exr",
-        "Scene_Black_Hole_48x27_disk1_0001.exr",
-        "Scene_Black_Hole_48x27_disk2_0001.exr",
-        "Scene_Black_Hole_48x27_disk3_0001.exr",
-    ]
+    assert list(files(tmp_path)) == [MAP, LAYER]
+    for wanted in addon_module("outputs.frames").requests_at(scene, 1):
+        assert addon_module("bake.check").is_valid(wanted)
+        assert addon_module("bake.check").count_baked(scene, hole.name, wanted, range(1, 5)) == 1
+
+
+def test_passes_are_baked_if_they_are_asked_for(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
+) -> None:
+    scene.umbra.disk_passes = True
+    bake()
+    names = [f"Scene_Black_Hole_48x27_disk{number}_0001.exr" for number in (1, 2, 3)]
+    assert list(files(tmp_path)) == [MAP, *names, LAYER]
     physics = addon_module("core.physics_api").physics
-    warp_map = physics.read_warp_map(find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_0001.exr"))
-    for number in (1, 2, 3):
-        one = physics.read_disk_pass(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk{number}_0001.exr"))
+    warp_map = physics.read_warp_map(find_map(tmp_path / "maps", MAP))
+    for number, name in enumerate(names, start=1):
+        one = physics.read_disk_pass(find_map(tmp_path / "maps", name))
         assert one.metadata["crossing"] == number
         assert one.metadata["hash"] == warp_map.metadata["hash"]
-    (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
-    assert addon_module("bake.check").count_baked(scene, hole.name, wanted, range(1, 5)) == 1
 
 
+# What the compositor does, what makes another layer, and whether that is of another geometry.
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [("inner_at_isco", False), ("outer_radius", 12.0), ("retrograde", True), ("crossings", 2), ("enabled", False)],
+    ("name", "value", "is_live"),
+    [
+        ("inner_at_isco", False, False),
+        ("outer_radius", 12.0, False),
+        ("retrograde", True, False),
+        ("crossings", 2, False),
+        ("turning_speed", 3.0, False),
+        ("band", "MONOCHROMATIC", False),
+        ("temperature", 5000.0, False),
+        ("seed", 7, False),
+        ("exposure", 2.0, True),
+        ("opacity", 0.5, True),
+        ("tint", (1.0, 0.5, 0.5), True),
+        ("light", True, True),
+    ],
 )
-def test_settings_of_the_passes_make_them_stale(
-    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, name: str, value: object
+def test_settings_make_another_layer_and_leave_the_map_alone(
+    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, name: str, value: object, is_live: bool
 ) -> None:
     bake()
     before = files(tmp_path)
     setattr(hole.umbra.disk, name, value)
     bake()
     after = files(tmp_path)
-    assert after["Scene_Black_Hole_48x27_0001.exr"] != before["Scene_Black_Hole_48x27_0001.exr"]
-
-
-def test_settings_of_the_look_leave_the_passes_alone(
-    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path
-) -> None:
-    bake()
-    before = files(tmp_path)
-    for preset in ("GARGANTUA", "PHYSICAL", "BLUE_HOT", "EMBER"):
-        assert bpy.ops.umbra.disk_preset(preset=preset) == {"FINISHED"}
-    hole.umbra.disk.turning_speed, hole.umbra.disk.light, hole.umbra.disk.beaming = 3.0, True, "MONOCHROMATIC"
-    bake()
-    assert files(tmp_path) == before
+    assert after[MAP] == before[MAP]
+    assert (after[LAYER] == before[LAYER]) == is_live
 
 
 def damage(path: Path) -> None:
@@ -88,58 +99,30 @@ def damage(path: Path) -> None:
     path.write_bytes(content)
 
 
-def of_another_map(path: Path) -> None:
+def of_another_frame(path: Path) -> None:
     path.write_bytes(path.with_name(path.name.replace("_0001", "_0002")).read_bytes())
 
 
-@pytest.mark.parametrize("spoil", [Path.unlink, damage, of_another_map])
-@pytest.mark.parametrize("number", [1, 3])
-def test_a_spoilt_pass_makes_the_frame_stale(
+@pytest.mark.parametrize("spoil", [Path.unlink, damage, of_another_frame])
+def test_a_spoilt_layer_makes_the_frame_stale(
     scene: bpy.types.Scene,
     hole: bpy.types.Object,
     tmp_path: Path,
     addon_module: Callable[[str], ModuleType],
-    number: int,
     spoil: Callable[[Path], None],
 ) -> None:
     fault_of = addon_module("bake.check").fault_of
     bake()
-    scene.camera.location.x += 1.0
     scene.frame_set(2)
     bake()
-    scene.camera.location.x -= 1.0
     scene.frame_set(1)
-    (wanted,) = addon_module("outputs.frames").requests_at(scene, 1)
-    assert wanted.path == find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_0001.exr")
+    _, wanted = addon_module("outputs.frames").requests_at(scene, 1)
+    assert wanted.path == find_map(tmp_path / "maps", LAYER)
     assert fault_of(wanted) is None
-    spoil(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk{number}_0001.exr"))
-    fault = fault_of(wanted)
-    assert f"disk{number}" in fault
+    spoil(wanted.path)
+    assert "_light_" in fault_of(wanted)
     bake()
     assert fault_of(wanted) is None
-
-
-def test_frames_of_an_orbit_share_rays_and_turn_their_azimuth(
-    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
-) -> None:
-    """Turning the hole about its axis is the camera's orbit; the map of another frame is turned, not traced."""
-    hole.rotation_euler.z = 0.0
-    hole.keyframe_insert("rotation_euler", frame=1)
-    hole.rotation_euler.z = 0.5
-    hole.keyframe_insert("rotation_euler", frame=2)
-    scene.frame_start, scene.frame_end = 1, 2
-    assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
-    physics = addon_module("core.physics_api").physics
-    first, second = (
-        physics.read_disk_pass(find_map(tmp_path / "maps", f"Scene_Black_Hole_48x27_disk1_000{frame}.exr"))
-        for frame in (1, 2)
-    )
-    seen = first.coverage > 0.0
-    assert seen.sum() > 50
-    turned = (second.phi - first.phi)[seen]
-    np.testing.assert_allclose(np.cos(turned), np.cos(0.5), atol=1e-5)
-    np.testing.assert_array_equal(first.radius, second.radius)
-    assert second.metadata["counts"]["rays"] == 0
 
 
 def test_switching_the_disk_off_takes_all_of_it_away(
@@ -170,65 +153,39 @@ def test_removing_the_set_up_removes_the_disk_and_a_new_one_brings_it_back(
     assert addon_module("outputs.shared.compositor_tree").find_setup(scene).group.inputs["Disk"].is_linked
 
 
-def test_a_damaged_group_is_rebuilt_when_the_file_is_opened(
+def test_the_groups_of_version_0_1_give_way_to_the_layer(
     scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
-    groups = [addon_module("nodes.disk_group").group_of(3), addon_module("nodes.disk_group").image_group(False)]
-    for group in groups:
-        tree = group.find()
-        tree[group.version_key] = 0
-        for node in list(tree.nodes)[::3]:
-            tree.nodes.remove(node)
-    hole.umbra.disk["temperature"] = 5123.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    for group in groups:
-        tree = group.find()
-        assert group.is_current(tree)
-        assert all(link.is_valid for link in tree.links)
-
-
-def test_the_first_versions_group_gives_way_to_the_one_that_fits(
-    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
-) -> None:
-    """A file as version 1 left it: one group for all disks, sockets in another order, and a table of the profile."""
-    setup = addon_module("outputs.shared.compositor_tree").find_setup(scene)
-    node = addon_module("outputs.shared.compositor_tree").find_node(setup.tree, "disk")
-    former = bpy.data.node_groups.new("Umbra Disk", "CompositorNodeTree")
-    former["umbra_disk_version"] = 1
+    """A file as version 0.1 left it: the disk drawn by a group from passes and packed tables."""
+    tree_of = addon_module("outputs.shared.compositor_tree")
+    setup = tree_of.find_setup(scene)
+    wanted = links_of(setup.tree)
+    tree, layer = setup.tree, tree_of.find_node(setup.tree, "disk_layer")
+    image = layer.image
+    tree.nodes.remove(layer)
+    bpy.data.images.remove(image)
+    former = bpy.data.node_groups.new("Umbra Disk 3", "CompositorNodeTree")
+    former["umbra_disk_version_3"] = 4
     former.interface.new_socket("Disk", in_out="OUTPUT", socket_type="NodeSocketColor")
-    for name in ("Pass 1", "Pass 2", "Pass 3", "Profile", "Colors", "Texture"):
+    for name in ("Pass 1", "Colors", "Texture"):
         former.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketColor")
-    former.interface.new_socket("Pattern Phase", in_out="INPUT", socket_type="NodeSocketFloat")
-    wanted = links_of(setup.tree), [curve.data_path for curve in setup.tree.animation_data.drivers]
-    node.node_tree = former
-    table = setup.tree.nodes.new("CompositorNodeImage")
-    table["umbra_role"] = "disk_profile"
-    table.image = bpy.data.images.new("Umbra Disk Profile (Black Hole)", 1, 16)
-    setup.tree.links.new(table.outputs["Image"], node.inputs["Profile"])
+    former.interface.new_socket("Streaks", in_out="INPUT", socket_type="NodeSocketFloat")
+    node = tree.nodes.new("CompositorNodeGroup")
+    node.node_tree, node["umbra_role"] = former, "disk"
+    node.inputs["Streaks"].driver_add("default_value").driver.expression = "frame"
+    tree.links.new(node.outputs["Disk"], setup.group.inputs["Disk"])
+    for name, role in (("Pass 1", "disk_pass_1"), ("Colors", "disk_colors"), ("Texture", "disk_texture")):
+        table = tree.nodes.new("CompositorNodeImage")
+        table["umbra_role"] = role
+        table.image = bpy.data.images.new(f"Umbra Disk {name.replace('Texture', 'Streaks')}", 1, 16)
+        tree.links.new(table.outputs["Image"], node.inputs[name])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    tree = addon_module("outputs.shared.compositor_tree").find_setup(bpy.context.scene).tree
-    assert (links_of(tree), [curve.data_path for curve in tree.animation_data.drivers]) == wanted
-    assert "Umbra Disk" not in bpy.data.node_groups
-    assert not any(image.name.startswith("Umbra Disk Profile") for image in bpy.data.images)
-
-
-def test_a_missing_pass_is_magenta(
-    scene: bpy.types.Scene, hole: bpy.types.Object, tmp_path: Path, addon_module: Callable[[str], ModuleType]
-) -> None:
-    """Where nothing checks: in a Blender whose handlers do not run."""
-    bake()
-    find_map(tmp_path / "maps", "Scene_Black_Hole_48x27_disk2_0001.exr").unlink()
-    handlers = addon_module("render.handlers")
-    handlers.unregister()
-    try:
-        scene.render.filepath = str(tmp_path / "picture.exr")
-        bpy.ops.render.render(write_still=True)
-    finally:
-        handlers.register()
-    pixels, _ = addon_module("core.physics_api").physics.read_exr(tmp_path / "picture.exr")
-    np.testing.assert_allclose(pixels[..., :3], np.broadcast_to((1.0, 0.0, 1.0), pixels[..., :3].shape), atol=1e-6)
+    tree = tree_of.find_setup(bpy.context.scene).tree
+    assert links_of(tree) == wanted
+    assert not any("Streaks" in curve.data_path for curve in tree.animation_data.drivers)
+    assert not [each.name for each in bpy.data.node_groups if each.name.startswith("Umbra Disk")]
+    assert [each.name for each in bpy.data.images if each.name.startswith("Umbra Disk")] == ["Umbra Disk Light"]
 
 
 @pytest.mark.parametrize(
@@ -256,8 +213,8 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     """A white plate close to the plane of a bright even disk is lit by the disk's own radiance."""
     settings = hole.umbra.disk
     values = {
-        "streaks": 0.0, "clumps": 0.0, "falloff": 0.0, "color_variation": 0.0, "opacity": 1.0, "exposure": 0.0,
-        "inner_softness": 0.0, "outer_softness": 0.0, "gain": 1.0, "temperature": 6500.0, "light": True,
+        "strands": 0.0, "smoke": 0.0, "falloff": 0.0, "color_variation": 0.0, "depth": 100.0, "exposure": 0.0,
+        "inner_softness": 0.0, "outer_softness": 0.0, "temperature": 6500.0, "light": True,
     }  # fmt: skip
     for name, value in values.items():
         setattr(settings, name, value)
@@ -292,7 +249,7 @@ def test_light_has_the_brightness_of_the_picture_and_no_camera_sees_it(
     lit = pixels[12:15, 22:26].reshape(-1, 4)
     assert (lit[:, 3] == 1.0).all()
     assert pixels[0, 0, 3] == 0.0, "beside the plate there is nothing, not the glowing disk"
-    expected = modules.physics.disk_color(np.array([6500.0]))[0]
+    expected = modules.physics.black_body_color(6500.0)
     # The disk fills all but the horizon of what the plate sees; 256 samples a pixel, twelve pixels.
     np.testing.assert_allclose(lit[:, :3].mean(axis=0), expected, rtol=0.05)
 
@@ -326,11 +283,6 @@ def test_light_follows_keyframes(
     # Cycles picks the same faces with other shares of the light: a percent with so few samples.
     assert lit[1] / lit[0] == pytest.approx(1.5, rel=0.03)
     assert lit[2] / lit[0] == pytest.approx(2.0, rel=0.03)
-    light = addon_module("outputs.shared.disk_light").find(hole)
-    scene.frame_set(1)
-    brightest = max(each.color[0] for each in light.data.attributes["Light"].data)
-    scene.frame_set(3)
-    assert max(each.color[0] for each in light.data.attributes["Light"].data) == pytest.approx(4.0 * brightest)
 
 
 def test_light_goes_with_its_hole(
@@ -355,16 +307,10 @@ def test_holes_of_two_scenes_keep_values_of_their_own(
     other.umbra.active_hole = second
     addon_module("outputs.compositor.compositing").set_up(other)
     second.umbra.disk.enabled = True
-    find_setup, find_node = (
-        addon_module("outputs.shared.compositor_tree").find_setup,
-        addon_module("outputs.shared.compositor_tree").find_node,
-    )
-    nodes = [find_node(find_setup(each).tree, "disk") for each in (scene, other)]
-    spins = [each.inputs["Spin"].default_value for each in nodes]
-    assert spins == pytest.approx([0.9, 0.1])
-    metric = addon_module("core.physics_api").physics
-    edges = [each.inputs["Inner Edge"].default_value for each in nodes]
-    assert edges == pytest.approx([metric.isco_radius(spin) for spin in spins])
+    hole.umbra.disk.exposure, second.umbra.disk.exposure = 1.0, -2.0
+    find_setup = addon_module("outputs.shared.compositor_tree").find_setup
+    exposures = [find_setup(each).group.inputs["Disk Exposure"].default_value for each in (scene, other)]
+    assert exposures == pytest.approx([1.0, -2.0])
 
 
 class Layout:
@@ -406,7 +352,8 @@ def test_panel_shows_every_setting(hole: bpy.types.Object, addon_module: Callabl
     for at_isco, profile in ((True, "novikov_thorne"), (False, "power_law")):
         settings.inner_at_isco, settings.profile, settings.light = at_isco, profile, not at_isco
         settings.texture = None if at_isco else bpy.data.images.new("Picture", 4, 4)
-        for panel in (panels.VIEW3D_PT_umbra_disk, panels.VIEW3D_PT_umbra_disk_detail):
+        settings.thickness, settings.gap_depth, settings.spots = (0.0, 0.0, 0) if at_isco else (0.1, 0.5, 2)
+        for panel in panels.CLASSES[1:]:
             if hasattr(panel, "draw_header"):
                 panel.draw_header(Panel, bpy.context)
             panel.draw(Panel, bpy.context)

@@ -21,7 +21,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "node_groups"
 RENEW = "UMBRA_RENEW_SNAPSHOTS"
 BLENDER = f"blender{bpy.app.version[0]}"
-GROUPS = ("black_hole", "black_hole_filtered", "disk_2", "disk_image", "disk_image_picture", "world", "world_tint")
+GROUPS = ("black_hole", "black_hole_filtered", "disk_layer", "world", "world_tint")
 ALIKE = ("world", "world_tint")  # the same nodes in each version of Blender
 UNBOUNDED = 1e30
 
@@ -32,13 +32,11 @@ Places: TypeAlias = dict[bpy.types.Node, tuple[str, int]]
 @pytest.fixture
 def build(addon_module: Callable[[str], ModuleType]) -> Callable[[str], bpy.types.NodeTree]:
     """A function that builds a group by its name in `GROUPS`."""
-    black_hole, disk, world = (addon_module(f"nodes.{name}_group") for name in ("black_hole", "disk", "world"))
+    black_hole, world = (addon_module(f"nodes.{name}_group") for name in ("black_hole", "world"))
     builders = {
         "black_hole": black_hole.ensure_group,
         "black_hole_filtered": lambda: black_hole.ensure_group(8),
-        "disk_2": lambda: disk.ensure(2, picture=False),
-        "disk_image": lambda: disk.image_group(picture=False).ensure(),
-        "disk_image_picture": lambda: disk.image_group(picture=True).ensure(),
+        "disk_layer": addon_module("nodes.disk_layer").GROUP.ensure,
         "world": world.new_group,
         "world_tint": addon_module("nodes.world_tint").GROUP.ensure,
     }

@@ -168,7 +168,7 @@ def test_a_map_that_changes_after_the_check(
     assert "[render.map-changed]" in told[0] or "[file." in told[0]
 
 
-ROLES = ["map", "sky", "disk_pass_1", "disk_colors", "disk_texture", "disk"]
+ROLES = ["map", "sky", "disk_layer"]
 
 
 @pytest.mark.parametrize("role", ROLES)
@@ -188,10 +188,10 @@ def test_muted_nodes(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, to
     assert "[compositor.muted]" in told[0]
 
 
-def test_muted_passes_over_the_lens(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, told: list[str]) -> None:
+def test_a_muted_layer_over_the_lens(scene: bpy.types.Scene, tmp_path: Path, exr: ModuleType, told: list[str]) -> None:
     add_hole(scene).umbra.disk.enabled = True
     bpy.ops.umbra.set_output(output="CYCLES_LENS")
-    (node,) = [node for node in compositor(scene).nodes if node.get("umbra_role") == "disk_pass_1"]
+    (node,) = [node for node in compositor(scene).nodes if node.get("umbra_role") == "disk_layer"]
     node.mute = True
     render(scene, tmp_path / "picture.exr", exr)
     assert "[compositor.muted]" in told[0]

@@ -3,7 +3,10 @@
 
 import bpy
 
+from ...bake.kinds import LIGHT_LAYER
+from ...bake.names import sequence_path
 from ...nodes import disk_layer
+from ...scene import cameras
 from ..shared import disk_sync
 from ..shared.compositor_tree import find_setup
 
@@ -21,3 +24,6 @@ def refresh(scene: bpy.types.Scene) -> None:
         disk_sync.remove(setup.tree)
     disk_sync.ensure_layer(setup.tree, setup.group.inputs[disk_layer.DISK.name])
     disk_sync.follow(setup.group, hole)
+    # A node that got its image only while Blender renders would show it a frame late.
+    path = sequence_path(scene, hole.name, cameras.render_size(scene.render), LIGHT_LAYER)
+    disk_sync.point_at(setup.tree, path)
