@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The disk in rendered pictures: each pixel is the layer of light over the bent sky, at any frame, size and look.
 
-The layer itself is checked in tests/physics/matter; here it is read from the file that the render has baked, and must
-be the one of the settings at the frame. The group works in float32: LIGHT is the share of the brightest light by which a
+The layer itself is checked in tests/physics/matter. Here it is read from the file that the render has baked, and must
+be that of the settings at the frame. The group works in float32: LIGHT is the share of the brightest light by which a
 pixel may differ.
 """
 
