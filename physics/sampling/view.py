@@ -19,7 +19,7 @@ from ..kerr.shadow_outline import as_seen
 from ..numerics.arrays import Array
 from ..numerics.blocks import blocks
 from ..numerics.sphere import spherical_triad
-from ..shot.cameras import PanoramaCamera
+from ..shot.cameras import HolePanorama, PanoramaCamera
 from ..shot.map_parameters import WarpMapParameters
 
 # Points on the shadow's outline, for the square root of the picture's width and height in pixels. Chords between n
@@ -46,7 +46,7 @@ class View:
         self._camera_to_triad = (triad @ np.array(parameters.camera_to_hole)).T
         self._camera_to_motion = self._camera_to_triad @ camera_triad(self._observer).T
         self.hole_to_world = np.array(parameters.hole_to_world)
-        self.is_panorama = isinstance(parameters.camera, PanoramaCamera)
+        self.is_panorama = isinstance(parameters.camera, PanoramaCamera | HolePanorama)
         """Whether the picture is of all directions."""
         self.phi = self._observer.phi
         """The camera's azimuth about the spin axis, radians."""

@@ -328,6 +328,93 @@ class PanoramaCamera:
         return longitude, latitude
 
 
+@dataclass(frozen=True)
+class HolePanorama:
+    """All directions, finer toward the camera's own: what is ahead is at the top, position angles run across.
+
+    No camera of Blender's, but the one that a layer of light for all directions is made with. The angle alpha from
+    straight ahead is FOCUS (e^(k v) - 1), v from 0 at the top to 1 at the bottom, where alpha is pi. The position angle
+    runs from x, to the right, to y, up.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the picture in pixels.
+
+    Raises
+    ------
+    BlackHoleError
+        For a size out of range.
+    """
+
+    width: int
+    height: int
+
+    kind = "hole panorama"
+
+    FOCUS = 0.06
+    """Radians; nearer than this, rows are of nearly equal height."""
+    RATE = math.log(1.0 + math.pi / FOCUS)
+    """k."""
+
+    def __post_init__(self) -> None:
+        _check_size(self.width, self.height)
+
+    def resized(self, width: int, height: int) -> HolePanorama:
+        """Return the camera that sees exactly the same in another number of pixels.
+
+        Raises
+        ------
+        BlackHoleError
+            For a size out of range.
+        """
+        return replace(self, width=width, height=height)
+
+    def cropped(self, column: int, row: int, width: int, height: int) -> HolePanorama:
+        """Refuse: a part of it is not of all directions.
+
+        Raises
+        ------
+        BlackHoleError
+        """
+        raise BlackHoleError("A panorama about the hole cannot be cropped.", code="camera.lens")
+
+    def directions(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the unit vectors seen at pixel coordinates x, y of any one shape; shape (..., 3)."""
+        x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        (ahead, aside), (right, up) = (cos_sin(each) for each in self._angles(x, y))
+        return by_component(aside * right, aside * up, -ahead)
+
+    def component(self, x: ArrayLike, y: ArrayLike, vector: Array) -> Array:
+        """Return the component along `vector`, shape (3,), of the unit vectors seen at x, y, which may broadcast."""
+        (ahead, aside), (right, up) = (cos_sin(each) for each in self._angles(x, y))
+        along: Array = aside * (vector[0] * right + vector[1] * up) - vector[2] * ahead
+        return along
+
+    def pixels(self, directions: Array) -> tuple[Array, Array]:
+        """Return the pixel coordinates where directions, shape (n, 3), are seen, (n,) each."""
+        away = np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), -directions[:, 2])
+        around = np.arctan2(directions[:, 1], directions[:, 0]) % (2.0 * math.pi)
+        return around / (2.0 * math.pi) * self.width, np.log1p(away / self.FOCUS) / self.RATE * self.height
+
+    def pixels_around(self, directions: Array) -> tuple[Array, Array]:
+        """Return what `pixels` does: nothing is beyond its border."""
+        return self.pixels(directions)
+
+    def solid_angles(self) -> Array:
+        """Return the solid angle of each pixel, steradians, shape (height, width)."""
+        away, _ = self._angles(np.zeros(self.height + 1), np.arange(self.height + 1.0))
+        bands = np.cos(away[:-1]) - np.cos(away[1:])
+        return np.repeat((bands * (2.0 * math.pi / self.width))[:, None], self.width, axis=1)
+
+    def _angles(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Return the angle from straight ahead and the position angle at pixel coordinates, radians."""
+        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+        away: Array = self.FOCUS * np.expm1(y * (self.RATE / self.height))
+        around: Array = x * (2.0 * math.pi / self.width)
+        return away, around
+
+
 # A new camera has its place in both.
-Camera = PerspectiveCamera | PanoramaCamera
-CAMERAS: dict[str, type[Camera]] = {each.kind: each for each in (PerspectiveCamera, PanoramaCamera)}
+Camera = PerspectiveCamera | PanoramaCamera | HolePanorama
+CAMERAS: dict[str, type[Camera]] = {each.kind: each for each in (PerspectiveCamera, PanoramaCamera, HolePanorama)}
