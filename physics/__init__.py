@@ -122,6 +122,9 @@ from .maps.world_map import world_parameters as world_map_parameters
 from .matter.light_layer import LightBaker, LightLayer, LightParameters, clock_rate, light_steps, render_matter
 from .matter.mean_light import disk_radiance
 from .matter.picture import Picture
+from .matter.world_light import FINAL as WORLD_LIGHT_GRID
+from .matter.world_light import PREVIEW as WORLD_LIGHT_PREVIEW_GRID
+from .matter.world_light import world_light_parameters
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .numerics.work import drain, share_of
@@ -136,7 +139,7 @@ from .reference.reference_render import (
 from .reference.reference_render import HALVE_ABOVE as RESIZE_HALVE_ABOVE
 from .reference.reference_render import MAGENTA as INVALID_MAP_COLOR
 from .reference.reference_render import render as render_reference
-from .shot.cameras import PanoramaCamera, PerspectiveCamera
+from .shot.cameras import Camera, HolePanorama, PanoramaCamera, PerspectiveCamera
 from .shot.disk import Disk
 from .shot.map_parameters import (
     DEFAULT_INTERPOLATION,
@@ -199,6 +202,8 @@ __all__ = [
     "STARS_FORMAT",
     "SUPERSAMPLING",
     "WARP_MAP_FORMAT",
+    "WORLD_LIGHT_GRID",
+    "WORLD_LIGHT_PREVIEW_GRID",
     "WORLD_MAP_FORMAT",
     "WORLD_MAP_GRID",
     "WORLD_MAP_HEADER_PARTS",
@@ -208,6 +213,7 @@ __all__ = [
     "AccuracyReport",
     "Background",
     "BlackHoleError",
+    "Camera",
     "Cancelled",
     "Choice",
     "Disk",
@@ -218,6 +224,7 @@ __all__ = [
     "DiskResult",
     "ExitMap",
     "Fate",
+    "HolePanorama",
     "ImageFileError",
     "LensNumbers",
     "LightBaker",
@@ -326,6 +333,7 @@ __all__ = [
     "trace_rays",
     "turned_map",
     "unstable_orbit_warning",
+    "world_light_parameters",
     "world_map_parameters",
     "write_disk_pass",
     "write_disk_passes",

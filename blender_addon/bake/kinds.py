@@ -63,4 +63,7 @@ WORLD_MAP = MapKind(
 LIGHT_LAYER = MapKind(
     "layer of light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="light_"
 )
-KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER]
+WORLD_LIGHT = MapKind(
+    "world light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="world_light_"
+)
+KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER, WORLD_LIGHT]

@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import bpy
 
-from . import black_hole_group, world_nodes, world_tint
+from . import black_hole_group, world_disk, world_nodes, world_tint
 from .builder import TreeBuilder
 from .versioned_group import SocketSpec, Values, VersionedGroup
 
 GROUP_NAME = "Umbra World"
-GROUP_VERSION = 4
+GROUP_VERSION = 5
 VERSION_KEY = "umbra_world_version"
 
 LENSING = SocketSpec(
@@ -45,6 +45,8 @@ VECTOR = SocketSpec(
 SHIFT = replace(world_tint.SHIFT, default=None, hide_value=False, in_out="OUTPUT")
 LIGHT = replace(world_tint.LIGHT, default=None, hide_value=False, in_out="OUTPUT")
 
+PLACE = replace(world_disk.PLACE, default=None, hide_value=False, in_out="OUTPUT")
+
 FORMER_OUTPUTS = {"Tint": SHIFT.name, "Fault": LIGHT.name}
 """Names of the outputs of versions 1 to 3 that fed what stands before a Background -> those of now."""
 
@@ -56,7 +58,7 @@ INPUTS = (
     black_hole_group.REDSHIFT_BRIGHTNESS,
     black_hole_group.TEMPERATURE,
 )
-OUTPUTS = (VECTOR, SHIFT, LIGHT, black_hole_group.SHADOW, black_hole_group.REDSHIFT)
+OUTPUTS = (VECTOR, SHIFT, LIGHT, black_hole_group.SHADOW, black_hole_group.REDSHIFT, PLACE)
 
 
 def _build(builder: TreeBuilder, values: Values) -> Values:
@@ -75,6 +77,7 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
         LIGHT.name: results.light,
         black_hole_group.SHADOW.name: results.shadow,
         black_hole_group.REDSHIFT.name: results.redshift,
+        PLACE.name: results.place,
     }
 
 

@@ -48,6 +48,7 @@ class WorldOutputs:
     light: Vector
     shadow: Float
     redshift: Float
+    place: Vector
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,8 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         left = floor(column)
         share_x = column - left
         columns = [(left + shift) / header.width for shift in (0.5, 1.5)]
+    with builder.frame("Place in a panorama about the hole"):
+        place = _place(looking, header, lensed)
     with builder.frame("The shadow's edge"):
         edges = [_texel(builder, each, 0.5)[1] for each in columns]
         delta = (away - mix(share_x, *edges)).labeled("From the edge")
@@ -131,7 +134,16 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
         shift = combine(redshift, inputs.redshift_color, inputs.redshift_brightness)
         light = combine(inputs.temperature, brightness, fault)
         shadow = lensed * (1.0 - visible)
-    return WorldOutputs(vector, shift, light, shadow, redshift)
+    return WorldOutputs(vector, shift, light, shadow, redshift, place)
+
+
+def _place(looking: Vector, header: _Header, lensed: Float) -> Vector:
+    """Where `physics.HolePanorama` sees a direction: turns about the hole's direction, from above down; and if bent."""
+    aside, up = looking.dot(header.polar), looking.dot(header.outward.cross(header.polar))
+    away = atan2(sqrt(multiply_add(aside, aside, up * up)), -looking.dot(header.outward))
+    focus, rate = physics.HolePanorama.FOCUS, physics.HolePanorama.RATE
+    down = log(multiply_add(away, 1.0 / focus, 1.0)) * (1.0 / rate)
+    return combine(atan2(up, aside) * (0.5 / math.pi), down, lensed)
 
 
 def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector, Float]:

@@ -57,6 +57,12 @@ class LiveMap(Protocol):
     def steps(self, parameters: "physics.WarpMapParameters") -> Generator[float, None, Any]:
         """Make the map step by step."""
 
+    def light_parameters(self, light: "physics.LightParameters") -> "physics.LightParameters":
+        """Return what the layer of the disk's light is made from, for a frame's draft."""
+
+    def show_light(self, scene: bpy.types.Scene, layer: "physics.LightLayer") -> bool:
+        """Show a layer of the disk's light; return whether it must be shown again a little later."""
+
     def can_show(self, scene: bpy.types.Scene) -> bool:
         """Return whether the scene has something that can show the map."""
 

@@ -21,7 +21,7 @@ from ..core.session import SESSION, Life, scene_of
 from ..outputs import frames, registry
 from ..scene import cameras, frame_setup
 from ..settings.scene_properties import ACCURACIES
-from . import thumbnail
+from . import shown, small_maps, thumbnail
 
 # Seconds that one slice of work may take, and between two of them.
 BUDGET, PAUSE = 0.08, 0.001
@@ -39,6 +39,8 @@ class _State:
     """What is shown, or in the making."""
     map_shown: object = None
     """What the World's map was made from."""
+    light_shown: object = None
+    """What the World's layer of light was made from."""
     steps: Generator[None, None, None] | None = None
     changed: bool = True
     updates: int = 0
@@ -85,7 +87,7 @@ def on_switched(owner: bpy.types.ID) -> None:
     scene = owner
     if is_on(scene):
         if can_run():
-            state(scene).shown = state(scene).map_shown = None
+            state(scene).shown = state(scene).map_shown = state(scene).light_shown = None
             _note(scene)
         return
     _states.drop(scene)
@@ -114,7 +116,7 @@ def start_again() -> None:
     """Show all previews again: after undo, or when a file was opened or saved."""
     for scene in bpy.data.scenes:
         if is_on(scene) and can_run():
-            state(scene).shown = state(scene).map_shown = None
+            state(scene).shown = state(scene).map_shown = state(scene).light_shown = None
             _note(scene)
 
 
@@ -214,7 +216,7 @@ def _step(scene: bpy.types.Scene, now: _State) -> None:
 
 def _camera_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: frame_setup.FrameSetup
-) -> "physics.PerspectiveCamera | physics.PanoramaCamera":
+) -> "physics.Camera":
     """What the thumbnail is seen by; for a lens that only the World knows, all directions."""
     data = cameras.active_camera(scene).evaluated_get(depsgraph).data
     try:
@@ -226,7 +228,7 @@ def _camera_of(
 def _work(
     uid: int,
     frame: frame_setup.FrameSetup,
-    camera: "physics.PerspectiveCamera | physics.PanoramaCamera",
+    camera: "physics.Camera",
     now: _State,
 ) -> Generator[None, None, None]:
     """Make a map and a thumbnail of a frame; the scene is looked up again after each pause."""
@@ -247,6 +249,7 @@ def _work(
             now.latency = time.perf_counter() - now.since
             redraw()
             yield
+        yield from _light_work(uid, frame, draft, now)
     picture = yield from _paused(thumbnail.steps(uid, replace(draft, camera=camera), frame.light))
     scene = scene_of(uid)
     if picture is not None and scene is not None:
@@ -254,6 +257,29 @@ def _work(
         now.latency = now.latency or time.perf_counter() - now.since
         redraw()
     now.updates += 1
+
+
+def _light_work(
+    uid: int, frame: frame_setup.FrameSetup, draft: "physics.WarpMapParameters", now: _State
+) -> Generator[None, None, None]:
+    """Make the layer of light that the output shows, if the frame has a disk."""
+    scene = scene_of(uid)
+    live = None if scene is None else registry.of(scene).live
+    if scene is None or live is None or frame.light is None:
+        return
+    view = replace(draft, disk=frame.light.view.disk, interpolation=small_maps.DISK_INTERPOLATION)
+    wanted = live.light_parameters(replace(frame.light, view=view))
+    if wanted == now.light_shown and live.is_shown(scene):
+        return
+    layer = yield from _paused(shown.light_steps(wanted))
+    scene = scene_of(uid)
+    if scene is None:
+        return
+    if live.show_light(scene, layer):
+        now.settle_at = time.perf_counter() + SETTLE
+    now.light_shown = wanted
+    redraw()
+    yield
 
 
 def _paused(steps: Generator[float, None, Result]) -> Generator[None, None, Result]:

@@ -14,7 +14,7 @@ from ..scene.frame_setup import FrameSetup
 from ..settings.hole_properties import CAMERA_ANIMATION
 from ..settings.scene_properties import ACCURACIES
 
-Camera = physics.PerspectiveCamera | physics.PanoramaCamera
+Camera = physics.Camera
 
 # Pixels of the map that follows, and at the most of the one that takes its place; and those of the smallest that
 # follows on a slow machine: with fewer, stars are squares.

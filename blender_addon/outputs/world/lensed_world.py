@@ -13,7 +13,7 @@ import bpy
 
 from ...core.blender_version import NODES_ARE_OPTIONAL
 from ...core.errors import SceneError
-from ...nodes import world_group, world_nodes
+from ...nodes import world_disk, world_group, world_nodes
 from ...scene.sky import environment, image_world
 from ...scene.sky.node_paths import SHINING
 from . import tinting
@@ -23,6 +23,8 @@ BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
 # On the lensed World: what it was made of, the image that reads its maps, and those that the preview's map is kept in.
 LENSED, FILE_IMAGE = "umbra_lensed", "umbra_world_map"
 LIVE_IMAGES = ("umbra_live_map_1", "umbra_live_map_2")
+# The same of the disk's layers of light.
+DISK_IMAGE, LIVE_DISK_IMAGES = "umbra_world_disk", ("umbra_live_disk_1", "umbra_live_disk_2")
 OF_IMAGE, OF_WORLD = "image", "world"
 
 # Resolution of the map by which Cycles samples the World's light. Its own choice here is one that takes 12 seconds a
@@ -162,13 +164,23 @@ def forget(scene: bpy.types.Scene) -> None:
 def _delete(world: bpy.types.World) -> None:
     node = group_node(world)
     group = None if node is None else node.node_tree
-    images = {image for image in map(world.get, (FILE_IMAGE, *LIVE_IMAGES)) if image is not None}
+    images = {
+        image
+        for image in map(world.get, (FILE_IMAGE, *LIVE_IMAGES, DISK_IMAGE, *LIVE_DISK_IMAGES))
+        if image is not None
+    }
+    disks = [
+        each.node_tree for each in world.node_tree.nodes if each.type == "GROUP" and world_disk.is_group(each.node_tree)
+    ]
     copies = [each for each in _inner_trees(world.node_tree) if _COPY in each]
     bpy.data.worlds.remove(world)
     for each in copies:  # outer ones come first
         if each.users == 0:
             bpy.data.node_groups.remove(each)
     tinting.remove_unused()
+    for disk in disks:
+        if disk is not None and disk.users == 0:
+            bpy.data.node_groups.remove(disk)
     if group is None or group.users > 0:
         return
     images.update(each.image for each in world_nodes.map_nodes(group) if each.image is not None)
@@ -212,7 +224,7 @@ def _inner_trees(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
             if (
                 inner is not None
                 and inner not in found
-                and not (world_group.is_group(inner) or tinting.is_group(inner))
+                and not (world_group.is_group(inner) or tinting.is_group(inner) or world_disk.is_group(inner))
             ):
                 found.append(inner)
                 waiting.append(inner)

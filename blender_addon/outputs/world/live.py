@@ -6,7 +6,7 @@ from collections.abc import Generator
 import bpy
 
 from ...core.physics_api import physics
-from . import lensed_world, world_sync
+from . import lensed_world, world_disk_sync, world_sync
 
 
 class WorldLiveMap:
@@ -19,6 +19,15 @@ class WorldLiveMap:
     def steps(self, parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WorldMap]":
         """Make the map step by step."""
         return physics.bake_world_map_steps(parameters)
+
+    def light_parameters(self, light: "physics.LightParameters") -> "physics.LightParameters":
+        """Return what the layer of light is made from."""
+        return physics.world_light_parameters(light, physics.WORLD_LIGHT_PREVIEW_GRID)
+
+    def show_light(self, scene: bpy.types.Scene, layer: "physics.LightLayer") -> bool:
+        """Let the World read a layer of light; Cycles must be made to look once more."""
+        world_disk_sync.show_live(scene, layer, world_sync.needs_turns(scene))
+        return world_sync.needs_turns(scene)
 
     def can_show(self, scene: bpy.types.Scene) -> bool:
         """Return whether the scene's World is the lensed one."""
@@ -40,3 +49,4 @@ class WorldLiveMap:
     def drop(self, scene: bpy.types.Scene) -> None:
         """Let the World read its files again."""
         world_sync.drop_live(scene)
+        world_disk_sync.drop_live(scene)

@@ -16,13 +16,14 @@ from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
 from ...scene.sky import environment
 from ..protocol import Look, Notice, Output, refusals
-from ..shared import sequencer, world_files
+from ..shared import disk_sync, sequencer, world_files
 from ..shared.look import CARRIED, EXPOSURE, PLACEMENT, look_of_group, write_to_group
-from . import lensed_world, panel, world_sync
+from . import lensed_world, panel, world_disk_sync, world_sync
 from .live import WorldLiveMap
 
 ANOTHER_WORLD = 'Scene "{}" has the output World, but another World was chosen since: set Output: World again.'
 MOTION_BLUR = "Motion Blur is on: the camera's turning blurs the World; its way past the hole, or the hole's, does not."
+DISK_BEHIND = "The disk is a part of the World: it is behind all objects."
 NOT_CHECKED = "Check Accuracy knows no world maps: choose Output: Compositor or Cycles Lens, and bake this frame."
 
 
@@ -81,6 +82,12 @@ class WorldOutput(Output):
         """Carry the scene's settings into the lensed World."""
         if scene.library is None:
             world_sync.refresh(scene)
+            world_disk_sync.refresh(scene)
+
+    def refresh_disk(self, scene: bpy.types.Scene) -> None:
+        """Put the disk into the lensed World, bring it up to date, or take it out."""
+        if scene.library is None:
+            world_disk_sync.refresh(scene)
 
     # --- rendering --------------------------------------------------------------------------------
 
@@ -89,8 +96,10 @@ class WorldOutput(Output):
         return True
 
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
-        """Return the frame's world map."""
-        return [request(scene, frame, WORLD_MAP, physics.world_map_parameters(frame.parameters))]
+        """Return the frame's world map, and its layer of light for all directions if it has a disk."""
+        needed = [request(scene, frame, WORLD_MAP, physics.world_map_parameters(frame.parameters))]
+        light = world_disk_sync.request_of(scene, frame)
+        return needed if light is None else [*needed, light]
 
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Refuse: world maps have no pixels of a picture."""
@@ -99,18 +108,24 @@ class WorldOutput(Output):
     def take_away(self, scene: bpy.types.Scene) -> None:
         """Let the World read no map, and refuse one that is not the lensed one any more."""
         world_sync.point_at_nothing(scene)
+        world_disk_sync.point_at_nothing(scene)
         sequencer.check(scene)
         check_unbent(scene)
         check_world(scene)
 
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Let the World read the frame's map."""
-        (wanted,) = self.map_requests(scene, frame)
+        wanted, *others = self.map_requests(scene, frame)
         world_files.check(scene)
         _check_resolved(wanted, frame)
         world_sync.point_at_files(scene)
         world_sync.forget_loaded_map(scene)
-        return _warnings(scene, frame)
+        warnings = _warnings(scene)
+        for light in others:
+            world_disk_sync.point_at_files(scene)
+            world_disk_sync.forget_loaded_layer(scene)
+            warnings += disk_sync.unresolved(light)
+        return warnings
 
     def stand_aside(self, scene: bpy.types.Scene) -> Callable[[], None]:
         """Let the scene have its own World."""
@@ -127,10 +142,12 @@ class WorldOutput(Output):
         """Let the World read the maps of the settings that are saved."""
         if scene.library is None:
             world_sync.point_at_files(scene)
+            world_disk_sync.point_at_files(scene)
 
     def forget_loaded_maps(self, scene: bpy.types.Scene) -> None:
         """Let Blender read the maps from their files again."""
         world_sync.forget_loaded_map(scene)
+        world_disk_sync.forget_loaded_layer(scene)
 
     # --- the panel --------------------------------------------------------------------------------
 
@@ -144,7 +161,9 @@ class WorldOutput(Output):
         found += [Notice(each) for each in lensed_world.unbent(scene)]
         if frame.motion is not Motion.NONE:
             found.append(Notice(MOTION_BLUR))
-        return found + [Notice(each, "ERROR") for each in _warnings(scene, frame)]
+        if frame.light is not None:
+            found.append(Notice(DISK_BEHIND))
+        return found + [Notice(each, "ERROR") for each in _warnings(scene)]
 
     def draw_settings(self, layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         """Draw the sky and the World's group."""
@@ -197,13 +216,9 @@ def _check_resolved(wanted: MapRequest, frame: FrameSetup) -> None:
         )
 
 
-def _warnings(scene: bpy.types.Scene, frame: FrameSetup) -> list[str]:
-    """What a render of a frame leaves out, in sentences."""
+def _warnings(scene: bpy.types.Scene) -> list[str]:
+    """What a render leaves out, in sentences."""
     found = []
     if scene.render.film_transparent:
         found.append("Film > Transparent is on: the camera does not see the World.")
-    if frame.parameters.disk is not None:
-        found.append(
-            f'The disk of "{frame.hole_name}" is not drawn by Output: World; choose Compositor or Cycles Lens.'
-        )
     return found
