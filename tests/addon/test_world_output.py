@@ -359,16 +359,80 @@ def test_the_cache_knows_world_maps(scene, physics, modules, tmp_path) -> None:
     assert names.kind_of(match) is modules("bake.kinds").WORLD_MAP
 
 
-def test_a_disk_that_is_not_drawn_is_named(
-    scene: bpy.types.Scene, tmp_path: Path, physics: ModuleType, modules: Callable, capfd: pytest.CaptureFixture[str]
+def disk_seen(scene: bpy.types.Scene, physics: ModuleType, frame: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """The disk's light, and the share that passes, for the pixels of a frame, from the layer for all directions."""
+    (path,) = Path(scene.umbra.map_folder).glob(f"*_world_light_{frame:04d}.exr")
+    layer = physics.physics.read_light_layer(path)
+    hole = np.array(scene.umbra.active_hole.matrix_world)[:3, :3]
+    hole /= np.linalg.norm(hole, axis=0)
+    camera = np.array(layer.metadata["parameters"]["camera_to_hole"])
+    x, y = physics.physics.HolePanorama(*physics.physics.WORLD_LIGHT_GRID).pixels(
+        looking(scene, physics) @ hole @ camera
+    )
+    planes = np.concatenate([layer.light, layer.transmittance[..., None]], axis=-1).astype(np.float64)
+    rows, columns = planes.shape[:2]
+    left, above = np.floor(x - 0.5), np.floor(y - 0.5)
+    share_x, share_y = (x - 0.5 - left)[:, None], (y - 0.5 - above)[:, None]
+
+    def row(shift: int) -> np.ndarray:
+        down = np.clip(above + shift, 0, rows - 1).astype(int)
+        one, other = (planes[down, (left + step).astype(int) % columns] for step in (0, 1))
+        return one + share_x * (other - one)
+
+    found = (row(0) + share_y * (row(1) - row(0))).reshape(*SIZE[::-1], 4)
+    return found[..., :3], found[..., 3:]
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+def test_the_disk_is_before_the_bent_sky(
+    scene: bpy.types.Scene, physics: ModuleType, modules: Callable, tmp_path: Path, engine: str
 ) -> None:
+    if engine == "EEVEE":
+        scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+        scene.eevee.taa_render_samples = 1
+        scene.render.filter_size = 0.0
+    disk = scene.umbra.active_hole.umbra.disk
     switch()
-    scene.umbra.active_hole.umbra.disk.enabled = True
+    nodes, links = len(scene.world.node_tree.nodes), links_of(scene.world.node_tree)
+    groups, images = set(bpy.data.node_groups.keys()), set(bpy.data.images.keys())
+    disk.enabled, disk.exposure, disk.opacity, disk.tint = True, 1.0, 0.75, (1.0, 0.5, 0.25)
     lines = modules("ui.status").lines(bpy.context)
-    assert "is not drawn by Output: World" in " ".join(line.text for line in lines)
-    render(scene, tmp_path / "picture.exr", physics.physics)
-    output = capfd.readouterr()
-    assert 'The disk of "Hole" is not drawn by Output: World' in output.out + output.err
+    assert "The disk is a part of the World" in " ".join(line.text for line in lines)
+    picture = render(scene, tmp_path / "picture.exr", physics.physics)
+    expected, where = predicted(scene, physics)
+    light, passes = disk_seen(scene, physics)
+    assert (passes < 0.7).mean() > 0.05, "there should be a disk in the picture"
+    covers = 0.75 * (1.0 - passes)
+    expected = (1.0 - covers) * expected + 0.75 * 2.0 * np.array([1.0, 0.5, 0.25]) * light
+    found = differences(picture, expected, where)
+    half_floats = engine == "EEVEE"
+    assert np.median(found) < (2e-3 if half_floats else 1e-5)
+    assert np.quantile(found, 0.98) < (2e-2 if half_floats else 2e-3)
+    disk.enabled = False
+    assert (len(scene.world.node_tree.nodes), links_of(scene.world.node_tree)) == (nodes, links)
+    assert (set(bpy.data.node_groups.keys()), set(bpy.data.images.keys())) == (groups, images)
+
+
+def test_keyframes_of_the_disk_are_followed_in_the_world(
+    scene: bpy.types.Scene, physics: ModuleType, tmp_path: Path
+) -> None:
+    disk = scene.umbra.active_hole.umbra.disk
+    disk.enabled = True
+    for frame, exposure, temperature in ((1, 0.0, 3000.0), (2, 2.0, 9000.0)):
+        disk.exposure, disk.temperature = exposure, temperature
+        disk.keyframe_insert("exposure", frame=frame)
+        disk.keyframe_insert("temperature", frame=frame)
+    switch()
+    scene.frame_start, scene.frame_end = 1, 2
+    scene.render.filepath = str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    for frame in (1, 2):
+        scene.frame_set(frame)
+        picture = read(tmp_path / f"frame_{frame:04d}.exr", physics.physics)
+        expected, where = predicted(scene, physics, frame)
+        light, passes = disk_seen(scene, physics, frame)
+        found = differences(picture, passes * expected + 2.0**disk.exposure * light, where)
+        assert np.quantile(found, 0.98) < 2e-3
 
 
 def test_the_lens_disk_goes_with_the_lens(scene: bpy.types.Scene) -> None:
