@@ -8,7 +8,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
-from physics import DISK_SETTINGS, MATTER_SETTINGS, SKY_SETTINGS, Setting  # noqa: E402  found only now
+from physics import MATTER_SETTINGS, SKY_SETTINGS, Setting  # noqa: E402  found only now
 
 _PLACE = re.compile(r"(<!-- settings: (\w+) -->\n).*?(<!-- end of settings -->\n)", re.DOTALL)
 
@@ -18,7 +18,7 @@ def _meaning(setting: Setting) -> str:
         items = [f"*{each.label}* (`{each.identifier}`): {each.description}" for each in setting.choices]
         return f"{setting.description}. {'. '.join(items)}"
     unit = f" {setting.unit}" if setting.unit else ""
-    return f"{setting.description}. {setting.low:g} to {setting.high:g}{unit}"
+    return f"{setting.description}. {setting.low:,.10g} to {setting.high:,.10g}{unit}"
 
 
 def _option(setting: Setting) -> str:
@@ -30,9 +30,9 @@ def disk_table() -> str:
     """Return the table of the disk's look."""
     rows = [
         f"| {setting.label} | `{name}` | {_option(setting)} | {_meaning(setting)} |\n"
-        for name, setting in DISK_SETTINGS.items()
+        for name, setting in MATTER_SETTINGS.items()
     ]
-    return "| control | property | `python -m physics render` | |\n|---|---|---|---|\n" + "".join(rows)
+    return "| control | property | `python -m physics bake` | |\n|---|---|---|---|\n" + "".join(rows)
 
 
 def sky_table() -> str:
@@ -41,14 +41,8 @@ def sky_table() -> str:
     return "| control | `python -m physics render` | |\n|---|---|---|\n" + "".join(rows)
 
 
-def light_table() -> str:
-    """Return the table of the look of a layer of light."""
-    rows = [f"| {setting.label} | {_option(setting)} | {_meaning(setting)} |\n" for setting in MATTER_SETTINGS.values()]
-    return "| setting | `python -m physics bake` | |\n|---|---|---|\n" + "".join(rows)
-
-
-TABLES = {"disk": disk_table, "sky": sky_table, "light": light_table}
-PAGES = (DOCS / "disk_settings.md", DOCS / "sky.md", DOCS / "disk_light.md")
+TABLES = {"disk": disk_table, "sky": sky_table}
+PAGES = (DOCS / "disk_settings.md", DOCS / "sky.md")
 
 
 def filled(page: str) -> str:

@@ -61,7 +61,6 @@ from .light.black_body import SECOND_RADIATION_CONSTANT
 from .light.black_body import color as black_body_color
 from .light.black_body import luminance as black_body_luminance
 from .light.black_body import rgb as black_body_rgb
-from .light.black_body import temperature_from_rgb as black_body_temperature
 from .light.color import DEFAULT_TEMPERATURE as DEFAULT_SKY_TEMPERATURE
 from .light.color import redshift_gain
 from .light.disk_flux import PROFILES as DISK_PROFILES
@@ -69,26 +68,6 @@ from .light.disk_flux import page_thorne_flux
 from .light.disk_flux import peak_flux as peak_disk_flux
 from .light.disk_flux import peak_radius as peak_disk_radius
 from .light.disk_flux import relative_flux as relative_disk_flux
-from .light.disk_look import COLORS as DISK_COLOR_COUNT
-from .light.disk_look import OPACITY_REACH as DISK_OPACITY_REACH
-from .light.disk_look import SMALLEST_ALPHA, SMALLEST_G
-from .light.disk_look import density as disk_density
-from .light.disk_look import emission as disk_emission
-from .light.disk_look import fade as disk_fade
-from .light.disk_look import seen_color as disk_color
-from .light.disk_look import shade as shade_disk
-from .light.disk_look import tinted_light as tinted_disk_light
-from .light.disk_settings import BOLOMETRIC as BOLOMETRIC_EXPONENT
-from .light.disk_settings import COLDEST as COLDEST_DISK
-from .light.disk_settings import DISK_SETTINGS, DiskLook
-from .light.disk_settings import HOTTEST as HOTTEST_DISK
-from .light.disk_settings import MONOCHROMATIC as MONOCHROMATIC_EXPONENT
-from .light.disk_settings import PRESET_TABLE as DISK_PRESET_TABLE
-from .light.disk_settings import PRESETS as DISK_PRESETS
-from .light.disk_texture import TURN_BETWEEN as DISK_PATTERN_TURN
-from .light.disk_texture import disk_texture
-from .light.disk_texture import pattern_period as disk_pattern_period
-from .light.disk_texture import pattern_shares as disk_pattern_shares
 from .light.matter_settings import (
     MATTER_PRESET_TABLE,
     MATTER_PRESETS,
@@ -128,8 +107,6 @@ from .matter.world_light import world_light_parameters
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .numerics.work import drain, share_of
-from .reference.disk_render import disk_layers
-from .reference.disk_render import over_sky as disk_over_sky
 from .reference.reference_render import (
     ANGLE_SLACK,
     LARGEST_ONE_PLUS_Z,
@@ -138,6 +115,7 @@ from .reference.reference_render import (
 )
 from .reference.reference_render import HALVE_ABOVE as RESIZE_HALVE_ABOVE
 from .reference.reference_render import MAGENTA as INVALID_MAP_COLOR
+from .reference.reference_render import over_sky as disk_over_sky
 from .reference.reference_render import render as render_reference
 from .shot.cameras import Camera, HolePanorama, PanoramaCamera, PerspectiveCamera
 from .shot.disk import Disk
@@ -155,8 +133,6 @@ from .stars.star_layer import StarBaker, StarLayer, StarSettings
 
 __all__ = [
     "ANGLE_SLACK",
-    "BOLOMETRIC_EXPONENT",
-    "COLDEST_DISK",
     "COMPANION_MARKS",
     "DEFAULT_ACCURACY_SAMPLES",
     "DEFAULT_CROSSINGS",
@@ -166,18 +142,11 @@ __all__ = [
     "DEFAULT_METHOD",
     "DEFAULT_SKY_TEMPERATURE",
     "DEFAULT_TOLERANCE",
-    "DISK_COLOR_COUNT",
-    "DISK_OPACITY_REACH",
     "DISK_PASS_FORMAT",
-    "DISK_PATTERN_TURN",
-    "DISK_PRESETS",
-    "DISK_PRESET_TABLE",
     "DISK_PROFILES",
-    "DISK_SETTINGS",
     "EXIT_MAP_FORMAT",
     "FEWEST_SKY_ROWS",
     "FOOTPRINT_FORMAT",
-    "HOTTEST_DISK",
     "IDENTITY",
     "INVALID_MAP_COLOR",
     "LARGEST_HALF",
@@ -187,7 +156,6 @@ __all__ = [
     "MATTER_PRESET_TABLE",
     "MATTER_SETTINGS",
     "METHODS",
-    "MONOCHROMATIC_EXPONENT",
     "MOST_CROSSINGS",
     "MOTIONS",
     "RESIZE_HALVE_ABOVE",
@@ -196,8 +164,6 @@ __all__ = [
     "SKY_FILTER",
     "SKY_LEVEL_MARGIN",
     "SKY_SETTINGS",
-    "SMALLEST_ALPHA",
-    "SMALLEST_G",
     "SMALLEST_ONE_PLUS_Z",
     "STARS_FORMAT",
     "SUPERSAMPLING",
@@ -218,7 +184,6 @@ __all__ = [
     "Choice",
     "Disk",
     "DiskAccuracy",
-    "DiskLook",
     "DiskPass",
     "DiskPasses",
     "DiskResult",
@@ -263,21 +228,12 @@ __all__ = [
     "black_body_color",
     "black_body_luminance",
     "black_body_rgb",
-    "black_body_temperature",
     "check_accuracy",
     "check_map",
     "clock_rate",
     "color_law",
-    "disk_color",
-    "disk_density",
-    "disk_emission",
-    "disk_fade",
-    "disk_layers",
     "disk_over_sky",
-    "disk_pattern_period",
-    "disk_pattern_shares",
     "disk_radiance",
-    "disk_texture",
     "drain",
     "ergosphere_radius",
     "exr_library",
@@ -321,14 +277,12 @@ __all__ = [
     "render_matter",
     "render_reference",
     "replacing_file",
-    "shade_disk",
     "shadow_outline",
     "share_of",
     "sky_levels",
     "star_sky",
     "stars_path",
     "temporary_target",
-    "tinted_disk_light",
     "trace_disk",
     "trace_rays",
     "turned_map",

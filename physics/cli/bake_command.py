@@ -73,7 +73,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Trace the map and write it, with its disk's passes.
+    """Trace the map and write it, with what is baked beside it.
 
     Raises
     ------

@@ -1,27 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The disk on the command line: options of ``bake`` and ``render``."""
+"""The disk on the command line: options of ``bake``, and the layer that ``render`` shows."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-from collections.abc import Mapping
-from typing import TypeVar
+from pathlib import Path
 
-from ..files.disk_pass_file import read_disk_passes
+from ..files.light_layer_file import light_layer_path, read_light_layer
 from ..geodesics.disk_tracer import DEFAULT_CROSSINGS
-from ..light.disk_settings import DISK_SETTINGS, PRESETS, DiskLook
-from ..light.disk_texture import disk_texture
 from ..light.matter_settings import MATTER_PRESETS, MATTER_SETTINGS, MatterLook
-from ..light.settings import Setting
 from ..maps.warp_map import WarpMap
-from ..matter.light_layer import check_time
-from ..numerics.arrays import Array
-from ..numerics.errors import BlackHoleError
-from ..reference.disk_render import disk_layers, over_sky
+from ..matter.light_layer import LightLayer, check_time
+from ..numerics.errors import BlackHoleError, WarpMapError
 from ..shot.disk import DEFAULT_OUTER_RADIUS, Disk
-
-Look = TypeVar("Look", DiskLook, MatterLook)
 
 
 def add_bake_options(parser: argparse.ArgumentParser) -> None:
@@ -40,29 +32,6 @@ def add_bake_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--disk-retrograde", action="store_true", default=unset, help="it turns against the hole")
 
 
-def add_render_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how the disk looks."""
-    parser.add_argument("--disk", action="store_true", help="draw the disk whose passes were baked beside the map")
-    parser.add_argument("--disk-look", choices=tuple(PRESETS), default="physical", help="how the disk looks")
-    parser.add_argument("--disk-time", type=float, default=0.0, help="time at which it is seen, in M")
-    look = parser.add_argument_group("the disk's look", "in place of the values that --disk-look has")
-    add_settings(look, DISK_SETTINGS)
-
-
-def add_settings(look: argparse._ArgumentGroup, settings: Mapping[str, Setting]) -> None:
-    """Add an option for each row of a table."""
-    for setting in settings.values():
-        added = "; added to the look's own value" if setting.is_added else ""
-        look.add_argument(
-            setting.option,
-            type=type(setting.default),
-            choices=[choice.value for choice in setting.choices] or None,
-            default=argparse.SUPPRESS,
-            metavar=None if setting.choices else "VALUE",
-            help=(setting.sentence + added).replace("%", "%%"),
-        )
-
-
 def add_light_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which layer of light is rendered along with a map."""
     parser.add_argument("--light", action="store_true", help="render the disk's light too, as a layer beside the map")
@@ -75,7 +44,16 @@ def add_light_options(parser: argparse.ArgumentParser) -> None:
         help="whose time that is: that of clocks far away, or the camera's own, which runs slower",
     )
     look = parser.add_argument_group("the light's look", "in place of the values that --light-look has")
-    add_settings(look, MATTER_SETTINGS)
+    for setting in MATTER_SETTINGS.values():
+        added = "; added to the look's own value" if setting.is_added else ""
+        look.add_argument(
+            setting.option,
+            type=type(setting.default),
+            choices=[choice.value for choice in setting.choices] or None,
+            default=argparse.SUPPRESS,
+            metavar=None if setting.choices else "VALUE",
+            help=(setting.sentence + added).replace("%", "%%"),
+        )
 
 
 def light_of(options: argparse.Namespace) -> tuple[MatterLook, float] | None:
@@ -86,9 +64,17 @@ def light_of(options: argparse.Namespace) -> tuple[MatterLook, float] | None:
     BlackHoleError
         If a layer is described but not asked for, there is no disk, or a setting is out of its range.
     """
-    look, changed = chosen(options, "light", MATTER_PRESETS[options.light_look], MATTER_SETTINGS)
+    look = MATTER_PRESETS[options.light_look]
+    changes = {
+        name: value for name in MATTER_SETTINGS if (value := getattr(options, f"light_{name}", None)) is not None
+    }
+    for name in changes:
+        if MATTER_SETTINGS[name].is_added:
+            changes[name] += getattr(look, name)
+    look = dataclasses.replace(look, **changes)
+    look.validate()
     if not options.light:
-        if changed:
+        if changes:
             raise BlackHoleError("The light's settings are given without it; add --light.", code="command.no-disk")
         return None
     if not options.disk:
@@ -114,44 +100,18 @@ def disk_of(options: argparse.Namespace) -> Disk | None:
     return Disk(**given) if options.disk else None
 
 
-def draw_disk(options: argparse.Namespace, warp_map: WarpMap, sky: Array) -> Array:
-    """Return the picture, shape (height, width, 4), of the disk that the options of ``render`` ask for over a sky.
+def read_layer(map_path: Path, warp_map: WarpMap) -> LightLayer:
+    """Return the layer of light that was baked beside a map.
 
     Raises
     ------
-    BlackHoleError
-        If a setting of the look is out of its range.
     WarpMapError
-        If a pass is missing or damaged, or belongs to another map.
+        If it is missing or damaged, or belongs to another map.
     """
-    look = look_of(options)
-    layers = disk_layers(read_disk_passes(options.map, warp_map), look, disk_texture(), options.disk_time)
-    return over_sky(sky, *layers)
-
-
-def look_of(options: argparse.Namespace) -> DiskLook:
-    """Return the look that the options of ``render`` ask for.
-
-    Raises
-    ------
-    BlackHoleError
-        If a setting is out of its range.
-    """
-    return chosen(options, "disk", PRESETS[options.disk_look], DISK_SETTINGS)[0]
-
-
-def chosen(options: argparse.Namespace, prefix: str, look: Look, settings: Mapping[str, Setting]) -> tuple[Look, bool]:
-    """Return a look with the settings that the options give in place of its own, and whether they give any.
-
-    Raises
-    ------
-    BlackHoleError
-        If a setting is out of its range.
-    """
-    changes = {name: value for name in settings if (value := getattr(options, f"{prefix}_{name}", None)) is not None}
-    for name in changes:
-        if settings[name].is_added:
-            changes[name] += getattr(look, name)
-    look = dataclasses.replace(look, **changes)
-    look.validate()
-    return look, bool(changes)
+    path = Path(light_layer_path(map_path))
+    if not path.exists():
+        raise WarpMapError(f"{path} does not exist; bake the map again with --disk --light.", code="file.missing")
+    layer = read_light_layer(path)
+    if layer.metadata["hash"] != warp_map.metadata["hash"]:
+        raise WarpMapError(f"{path} does not belong to {map_path}; bake it again.", code="map.passes-mixed")
+    return layer

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..files.disk_pass_file import find_pass
-from ..files.light_layer_file import light_layer_path, read_light_layer
+from ..files.light_layer_file import light_layer_path
 from ..files.star_file import stars_path
 from ..files.warp_map_file import read_warp_map, read_warp_map_metadata
 from ..images.exr import replacing, write_exr
@@ -19,9 +19,8 @@ from ..images.picture import read_picture
 from ..images.png import write_png
 from ..light.color import redshift_gain
 from ..light.sky_settings import RENDER_ARGUMENTS, SKY_FILTER, SKY_SETTINGS
-from ..numerics.errors import BlackHoleError, WarpMapError
-from ..reference.disk_render import over_sky
-from ..reference.reference_render import render
+from ..numerics.errors import BlackHoleError
+from ..reference.reference_render import over_sky, render
 from . import disk_options, star_options
 from .console import note, say
 from .output_files import check_picture
@@ -55,9 +54,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=SKY_FILTER.identifier(int(SKY_FILTER.default)).lower(),
         help=SKY_FILTER.description,
     )
-    disk_options.add_render_options(parser)
     star_options.add_render_options(parser)
-    parser.add_argument("--light", action="store_true", help="draw the layer of light that was baked beside the map")
+    parser.add_argument("--light", action="store_true", help="draw the disk: its light that was baked beside the map")
 
 
 def sky_arguments(options: argparse.Namespace) -> dict[str, Any]:
@@ -81,15 +79,12 @@ def run(options: argparse.Namespace) -> None:
         if problem is not None:
             raise BlackHoleError(f"The {SKY_SETTINGS[name].label.lower()} {problem}.", code="settings.range")
     redshift_gain(1.0, temperature=options.temperature)  # which refuses temperatures that cannot be
-    if options.disk:
-        disk_options.look_of(options)
     disk = read_warp_map_metadata(options.map)["parameters"].get("disk")
     passes = [find_pass(options.map, crossing) for crossing in range(1, (disk["crossings"] if disk else 0) + 1)]
-    if options.disk and options.light:
-        raise BlackHoleError("--disk and --light draw the same disk; give one of them.", code="command.two-disks")
     light_path = light_layer_path(options.map)
     check_picture(options.output, [options.map, options.sky, *passes, Path(light_path), Path(stars_path(options.map))])
     warp_map = read_warp_map(options.map)
+    layer = disk_options.read_layer(options.map, warp_map) if options.light else None
     camera = warp_map.metadata["parameters"]["camera"]
     environment = read_picture(options.sky)
     broken = ~np.isfinite(environment)
@@ -108,14 +103,8 @@ def run(options: argparse.Namespace) -> None:
         looks=next(int(each.value) for each in SKY_FILTER.choices if each.identifier == options.filter.upper()),
     )
     image = star_options.add_stars(options, warp_map, picture.image) if options.stars else picture.image
-    if options.light:
-        layer = read_light_layer(light_path)
-        if layer.metadata["hash"] != warp_map.metadata["hash"]:
-            raise WarpMapError(
-                f"{light_path} does not belong to {options.map}; bake it again.", code="map.passes-mixed"
-            )
-        image = over_sky(image, layer.light.astype(np.float64), layer.transmittance.astype(np.float64))
-    image = disk_options.draw_disk(options, warp_map, image) if options.disk else image
+    if layer is not None:
+        image = over_sky(image, layer.light, layer.transmittance)
     with replacing(options.output) as temporary:
         if options.output.suffix.lower() == ".png":
             write_png(temporary, image)

@@ -41,9 +41,6 @@ COLDEST, HOTTEST = 100.0, 1e9
 _NODES = 16384
 _TABLE = np.linspace(np.log(COLDEST), np.log(HOTTEST), _NODES)
 
-# Ratios of red to blue determine temperatures in between these.
-_COLDEST_COLOR, _HOTTEST_COLOR = 1950.0, 1e6
-
 
 def _tristimulus(chromaticity: Array) -> Array:
     x, y = chromaticity[..., 0], chromaticity[..., 1]
@@ -149,30 +146,3 @@ def rgb(temperature: ArrayLike) -> Array:
     """
     light: Array = color(temperature) * luminance(temperature)[..., np.newaxis]
     return light
-
-
-def temperature_from_rgb(light: ArrayLike) -> Array:
-    """Temperature of the black body whose ratio of red to blue a color has.
-
-    Parameters
-    ----------
-    light : array_like, shape (..., 3)
-        Linear Rec. 709. Green does not matter.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Kelvin, 1950 to 1e6: what is redder or bluer than bodies can be gets the limits. NaN where the ratio does not
-        exist: red or blue negative or not finite, or both 0.
-    """
-    channels: Array = np.asarray(light, dtype=np.float64)
-    red, blue = channels[..., 0], channels[..., 2]
-    exists = np.isfinite(red) & np.isfinite(blue) & (red >= 0.0) & (blue >= 0.0) & (np.maximum(red, blue) > 0.0)
-    red, blue = np.where(exists, red, 1.0), np.where(exists, blue, 1.0)
-    larger = np.maximum(red, blue)
-    share = (blue / larger) / (red / larger + blue / larger)
-    _, colors = _table()
-    inside = (np.exp(_TABLE) >= _COLDEST_COLOR) & (np.exp(_TABLE) <= _HOTTEST_COLOR)
-    known = colors[inside, 2] / (colors[inside, 0] + colors[inside, 2])
-    kelvin: Array = np.where(exists, np.exp(np.interp(share, known, _TABLE[inside])), np.nan)
-    return kelvin

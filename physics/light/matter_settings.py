@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of what an artist decides about matter that numpy renders (`physics.matter`), and the presets.
 
-One row for each setting, as in `disk_settings`: the checks here and the options of ``python -m physics bake --light``
-are made from it. Rows that both tables have go by the same names.
+One row for each setting: the checks here, the options of ``python -m physics bake --light``, the properties of
+`object.umbra.disk` and the table in the manual (`docs/settings_tables.py`) are made from it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _choice(label: str, description: str, *choices: Choice) -> Any:
 
 @dataclass(frozen=True)
 class MatterLook:
-    """How matter looks."""
+    """How matter looks: numbers of any type become floats, or whole numbers."""
 
     profile: str = _choice(
         "Profile",
@@ -65,6 +65,9 @@ class MatterLook:
         "Temperature where the disk is hottest: it decides the color",
         500.0,
         60_000.0,
+        soft_low=1500.0,
+        soft_high=30_000.0,
+        step=100.0,
         unit="K",
         subtype="COLOR_TEMPERATURE",
     )
@@ -93,7 +96,17 @@ class MatterLook:
     light_travel: float = _amount(
         0.0, "Light Travel", "How much later what is farther away is seen: 0 is the film's picture, 1 is physics"
     )
-    exposure: float = _number(0.0, "Exposure", "Brightens the disk by this many stops", -32.0, 32.0, is_added=True)
+    exposure: float = _number(
+        0.0,
+        "Exposure",
+        "Brightens the disk by this many stops",
+        -32.0,
+        32.0,
+        soft_low=-8.0,
+        soft_high=8.0,
+        unit="stops",
+        is_added=True,
+    )
     depth: float = _number(
         2.0, "Optical Depth", "How opaque the disk is, seen face-on: 1 lets 37 % of the light behind it pass", 0.0, 1e4
     )
@@ -127,6 +140,13 @@ class MatterLook:
     spot_size: float = _number(0.08, "Spot Size", "Radius of hot spots over that of their orbits", 1e-2, 1.0)
     spot_heat: float = _number(0.5, "Spot Heat", "How much hotter hot spots are", 0.0, 3.0)
 
+    def __post_init__(self) -> None:
+        for name, setting in MATTER_SETTINGS.items():
+            if not setting.choices:
+                value = finite(getattr(self, name), f"the disk's {name.replace('_', ' ')}")
+                is_whole = isinstance(setting.default, int) and value.is_integer()
+                object.__setattr__(self, name, int(value) if is_whole else value)
+
     def validate(self) -> None:
         """Check all settings.
 
@@ -137,10 +157,8 @@ class MatterLook:
         """
         for name, setting in MATTER_SETTINGS.items():
             value, words = getattr(self, name), name.replace("_", " ")
-            if not setting.choices:
-                finite(value, f"the disk's {words}")
             problem = setting.problem(value)
-            if problem is None and isinstance(setting.default, int) and value != int(value):
+            if problem is None and isinstance(setting.default, int) and not isinstance(value, int):
                 problem = f"is {value:g}; give a whole number"
             if problem is not None:
                 raise BlackHoleError(f"The disk's {words} {problem}.", code="disk.setting")

@@ -48,7 +48,7 @@ class Setting:
     socket: str = ""
     """Name of the node groups' input."""
     option: str = ""
-    """Option of ``python -m physics render``."""
+    """Option of ``python -m physics``: of the sky of ``render``, of matter of ``bake``."""
     is_added: bool = False
     """On the command line the value is added to that of the preset, which it replaces otherwise."""
     choices: tuple[Choice, ...] = ()

@@ -106,8 +106,8 @@ class Surface:
         )
         fine, coarse = fields(look, self.trailing)
         where = spin, (inner, outer)
-        self.fine = TurningRings(fine, FINE_WIDTH, *where, int(look.seed), disk.retrograde)
-        self.coarse = TurningRings(coarse, COARSE_WIDTH, *where, int(look.seed) + 1, disk.retrograde)
+        self.fine = TurningRings(fine, FINE_WIDTH, *where, look.seed, disk.retrograde)
+        self.coarse = TurningRings(coarse, COARSE_WIDTH, *where, look.seed + 1, disk.retrograde)
         # A picture turns as a whole, as matter in its middle does.
         self._omega = float(orbital_frequency(spin, np.array([math.sqrt(inner * outer)]), disk.retrograde)[0])
         self._spots = _spots(look, spin, disk.retrograde)
@@ -193,9 +193,9 @@ class Surface:
             tint += log_g * self._tint_power
         light: Image = self._colors.take(_place(tint), axis=0)
         if own_color is not None:
-            hottest = np.float32(math.log(self.look.temperature))
+            hottest = np.full(1, math.log(self.look.temperature), dtype=np.float32)
             light = self._colors.take(_place(hottest + log_g * self._tint_power), axis=0)
-            light[:, :3] *= own_color / self._colors[_place(hottest[None]), :3]
+            light[:, :3] *= own_color / self._colors.take(_place(hottest), axis=0)[:, :3]
         power = np.float32(WIEN) * np.exp(-bright) if self.look.band == VISIBLE else np.float32(BOLOMETRIC_POWER)
         gain = np.exp(np.minimum(np.float32(0.5) * power * power * lost, np.float32(MOST_LOST_GAIN)))
         gain *= self._luminance.take(_place(bright))
@@ -243,7 +243,7 @@ class _Spot:
 
 
 def _spots(look: MatterLook, spin: float, retrograde: bool) -> list[_Spot]:
-    radii = look.spot_radius * SPOT_SPREAD ** np.arange(int(look.spots))
+    radii = look.spot_radius * SPOT_SPREAD ** np.arange(look.spots)
     omegas = orbital_frequency(spin, radii, retrograde)
     return [
         _Spot(radius, look.spot_size, 2.0 * math.pi * ((number * SPOT_TURN) % 1.0), omega)

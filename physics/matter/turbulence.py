@@ -45,7 +45,7 @@ def fields(look: MatterLook, trailing: float) -> tuple[RipMap, RipMap]:
         1 if the matter orbits toward +phi, else -1: strands trail.
     """
     shape = look.waves, look.stretch, trailing * look.pitch, look.ridges, look.warp
-    return _fine(*shape, int(look.seed)), _coarse(*shape, int(look.seed))
+    return _fine(*shape, look.seed), _coarse(*shape, look.seed)
 
 
 @lru_cache(maxsize=4)

@@ -131,6 +131,30 @@ def resize(image: ArrayLike, output_size: tuple[int, int]) -> FloatArray:
     return _bilinear_resize(picture, width, height)
 
 
+def over_sky(sky: ArrayLike, light: ArrayLike, transmittance: ArrayLike) -> FloatArray:
+    """Lay a layer of light over a picture, at the picture's size.
+
+    Parameters
+    ----------
+    sky : array_like, shape (height, width, 3 or 4)
+        The lensed sky, the shadow in it; or, premultiplied with an alpha, what a camera of bent rays sees.
+    light, transmittance : array_like, shape (map height, map width, 3) and (map height, map width)
+        Of a `LightLayer`; larger than the picture if its map is supersampled.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 4)
+        light + transmittance x sky, for alpha as well: a layer covers 1 - transmittance.
+    """
+    behind: FloatArray = np.asarray(sky, dtype=np.float64)
+    if behind.shape[2] == 3:
+        behind = _opaque(behind)
+    light, passes = np.asarray(light), np.asarray(transmittance)[..., None]
+    height, width = behind.shape[:2]
+    layer = resize(np.concatenate([light, 1.0 - passes, passes], axis=-1), (width, height))
+    return layer[..., :4] + layer[..., 4:] * behind
+
+
 def render(
     warp_map: WarpMapLike,
     environment: ArrayLike,

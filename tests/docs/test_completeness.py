@@ -41,7 +41,7 @@ def properties():
                 for label in (named or node.annotation.args)[:1]:
                     if isinstance(label, ast.Constant) and node.target.id not in UNSEEN:
                         yield f"{file.stem}.{node.target.id}", label.value
-    for name, setting in (physics.DISK_SETTINGS | physics.SKY_SETTINGS).items():
+    for name, setting in (physics.MATTER_SETTINGS | physics.SKY_SETTINGS).items():
         yield f"tables.{name}", setting.label
 
 
@@ -69,5 +69,5 @@ def test_operators_are_described():
 def test_what_is_looked_for_is_found():
     assert ("bake", "`--spin") in list(command_line_options())
     assert ("hole_properties.spin", "Spin") in list(properties())
-    assert ("tables.opacity", "Opacity") in list(properties())
+    assert ("tables.depth", "Optical Depth") in list(properties())
     assert ("umbra.bake_frame", "Bake This Frame") in list(operators())

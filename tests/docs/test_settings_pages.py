@@ -20,10 +20,10 @@ def test_pages_have_the_tables(page):
     assert text.count("<!-- settings: ") == 1
 
 
-@pytest.mark.parametrize("table", [physics.DISK_SETTINGS, physics.SKY_SETTINGS], ids=["disk", "sky"])
+@pytest.mark.parametrize("table", [physics.MATTER_SETTINGS, physics.SKY_SETTINGS], ids=["disk", "sky"])
 def test_rows_are_whole(table):
     rows = table.values()
-    for names in ([row.socket for row in rows], [row.option for row in rows], [row.label for row in rows]):
+    for names in ([row.option for row in rows], [row.label for row in rows]):
         assert all(names)
         assert len(set(names)) == len(names)
     for row in rows:
@@ -35,4 +35,4 @@ def test_rows_are_whole(table):
             soft_low = row.low if row.soft_low is None else row.soft_low
             soft_high = row.high if row.soft_high is None else row.soft_high
             assert row.low <= soft_low < soft_high <= row.high
-    assert tuple(choice.value for choice in physics.DISK_SETTINGS["profile"].choices) == physics.DISK_PROFILES
+    assert tuple(choice.value for choice in physics.MATTER_SETTINGS["profile"].choices) == physics.DISK_PROFILES

@@ -13,12 +13,15 @@ from physics import (
     BlackHoleError,
     Disk,
     Fate,
+    LightParameters,
     Observer,
     PanoramaCamera,
     PerspectiveCamera,
     UnstableOrbitWarning,
     WarpMapParameters,
     bake,
+    looking_at_hole,
+    render_matter,
     trace_disk,
     trace_rays,
 )
@@ -26,17 +29,14 @@ from physics.geodesics.tracer import trace_block
 from physics.kerr.metric import check_spin, ergosphere_radius, horizon_radius, isco_radius, photon_orbit_radius
 from physics.kerr.rays import rays_from_triad
 from physics.light.color import redshift_gain
-from physics.light.disk_look import shade
-from physics.light.disk_settings import DiskLook
-from physics.light.disk_texture import disk_texture
+from physics.light.matter_settings import MatterLook
+from physics.matter.light_layer import LEAST_TRANSMITTANCE
 from physics.numerics.sphere import celestial_coordinates, spherical_triad
 
 EVERY_TIME = {"derandomize": True, "database": None, "deadline": None, "suppress_health_check": list(HealthCheck)}
 many = settings(max_examples=150, **EVERY_TIME)
 some = settings(max_examples=40, **EVERY_TIME)
 few = settings(max_examples=12, **EVERY_TIME)
-
-TEXTURE = disk_texture()
 
 # --- what is put in ---------------------------------------------------------------------------------
 
@@ -194,16 +194,20 @@ def test_any_disk(name, value):
         assert 1 <= disk.crossings <= 8
 
 
+@pytest.fixture(scope="module")
+def disk_view():
+    place = (20.0, 0.0, 3.0)
+    return WarpMapParameters(0.9, PerspectiveCamera(12, 8, 10.0), place, looking_at_hole(place), disk=Disk())
+
+
 @many
-@given(st.sampled_from([field.name for field in dataclasses.fields(DiskLook)]), anything)
-def test_any_look_of_a_disk(name, value):
-    look = DiskLook(**{name: value})
-    if answered(lambda: look.validate() or look) is not None:
-        place = np.array([[1.5, 3.0, 12.0], [0.0, 3.0, 6.0], [0.3, 1.0, 1.8], [1.0, 0.5, 1.0]])
-        light, opacity = shade(look, Disk(), 0.9, tuple(place), TEXTURE, 10.0)
-        assert np.isfinite(light).all()
-        assert (light >= 0.0).all()
-        assert ((opacity >= 0.0) & (opacity <= 1.0)).all()
+@given(st.sampled_from([field.name for field in dataclasses.fields(MatterLook)]), anything)
+def test_any_look_of_a_disk(small_patterns, disk_view, name, value):
+    layer = answered(lambda: render_matter(LightParameters(disk_view, MatterLook(**{name: value}), 10.0)))
+    if layer is not None:
+        assert np.isfinite(layer.light).all()
+        assert (layer.light >= 0.0).all()
+        assert ((layer.transmittance >= np.float32(LEAST_TRANSMITTANCE)) & (layer.transmittance <= 1.0)).all()
 
 
 @many

@@ -135,23 +135,23 @@ def test_unstable_orbit_and_odd_sky_are_noted(baked, tmp_path):
 def test_a_disk_is_baked_beside_the_map_and_drawn(tmp_path, sky):
     path, picture = tmp_path / "map.exr", tmp_path / "picture.exr"
     small = ("--width", 64, "--height", 36, "--radius", 40, "--fov", 40)
-    result = run("bake", path, *small, "--disk", "--disk-crossings", 2, "--disk-outer", 15)
+    disk = ("--disk", "--disk-crossings", 2, "--disk-outer", 15)
+    result = run("bake", path, *small, *disk, "--light", "--light-look", "gargantua", "--light-time", 10)
     assert result.returncode == 0, result.stderr
-    assert f"wrote {tmp_path / 'map_disk2.exr'}" in result.stdout
-    result = run("render", path, sky, picture, "--disk", "--disk-look", "gargantua", "--disk-time", 10)
+    for name in ("map_disk2.exr", "map_light.exr"):
+        assert f"wrote {tmp_path / name}" in result.stdout
+    result = run("render", path, sky, picture, "--light")
     assert result.returncode == 0, result.stderr
     plain = tmp_path / "plain.exr"
     assert run("render", path, sky, plain).returncode == 0
     assert not np.array_equal(read_exr(picture)[0], read_exr(plain)[0])
-    # A pass of another bake is refused, and so is one that is missing.
-    other = tmp_path / "other.exr"
-    assert run("bake", other, *small, "--disk", "--disk-crossings", 2).returncode == 0
-    (tmp_path / "other_disk1.exr").replace(tmp_path / "map_disk1.exr")
-    result = run("render", path, sky, picture, "--disk")
+    # A layer of a map without that disk is refused, and so is one that is missing.
+    assert run("bake", path, *small, "--disk", "--disk-crossings", 2).returncode == 0
+    result = run("render", path, sky, picture, "--light")
     assert (result.returncode, "does not belong to" in result.stderr) == (1, True)
-    (tmp_path / "map_disk1.exr").unlink()
-    result = run("render", path, sky, picture, "--disk")
-    assert (result.returncode, "map_disk1.exr does not exist" in result.stderr) == (1, True)
+    (tmp_path / "map_light.exr").unlink()
+    result = run("render", path, sky, picture, "--light")
+    assert (result.returncode, "map_light.exr does not exist" in result.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(
@@ -172,11 +172,6 @@ def test_impossible_disks_are_refused_in_one_sentence(tmp_path, arguments, words
     assert not list(tmp_path.iterdir())
 
 
-def test_a_map_without_a_disk_has_none_to_draw(baked, sky, tmp_path):
-    result = run("render", baked, sky, tmp_path / "picture.png", "--disk")
-    assert (result.returncode, "baked without a disk" in result.stderr) == (1, True)
-
-
 @pytest.mark.parametrize(
     ("map_path", "expected"),
     [
@@ -193,17 +188,14 @@ def test_passes_are_named_by_one_rule(map_path, expected):
 
 
 @pytest.mark.parametrize("names", ["{stem}_disk{crossing}_{frame}.exr", "{stem}_{frame}_disk{crossing}.exr"])
-def test_a_disk_is_drawn_however_its_passes_are_named(tmp_path, sky, names):
+def test_passes_are_found_however_they_are_named(tmp_path, names):
     """The passes of a numbered map, as the add-on names them, and as this command line once did."""
-    path, picture = tmp_path / "shot_0007.exr", tmp_path / "picture.exr"
+    path = tmp_path / "shot_0007.exr"
     small = ("--width", 64, "--height", 36, "--radius", 40, "--fov", 40)
     assert run("bake", path, *small, "--disk", "--disk-crossings", 2).returncode == 0
     for crossing in (1, 2):
         name = names.format(stem="shot", frame="0007", crossing=crossing)
         (tmp_path / f"shot_disk{crossing}_0007.exr").replace(tmp_path / name)
-    result = run("render", path, sky, picture, "--disk")
-    assert result.returncode == 0, result.stderr
-    assert picture.is_file()
     result = run("accuracy", path, "--samples", 100, "--json")
     assert result.returncode == 0, result.stderr
     assert len(json.loads(result.stdout)["disk"]) == 2

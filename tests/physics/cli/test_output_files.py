@@ -16,10 +16,10 @@ SMALL = ("--width", "16", "--height", "9")
 
 
 @pytest.fixture
-def folder(tmp_path, capsys):
-    """A map with a disk, and a sky."""
+def folder(tmp_path, capsys, small_patterns):
+    """A map with a disk and its light, and a sky."""
     write_exr(tmp_path / "sky.exr", np.full((16, 32, 3), 0.25, np.float32))
-    bake = ("bake", str(tmp_path / "map.exr"), *SMALL, "--radius", "30", "--disk", "--disk-crossings", "1")
+    bake = ("bake", str(tmp_path / "map.exr"), *SMALL, "--radius", "30", "--disk", "--disk-crossings", "1", "--light")
     assert main(bake) == 0
     capsys.readouterr()
     return tmp_path
@@ -40,9 +40,9 @@ def refused(capsys, words, *arguments):
     assert not said.out
 
 
-@pytest.mark.parametrize("name", ["map.exr", "sky.exr", "map_disk1.exr"])
+@pytest.mark.parametrize("name", ["map.exr", "sky.exr", "map_disk1.exr", "map_light.exr"])
 @pytest.mark.parametrize("spelling", ["itself", "dots", "symbolic link", "hard link", "linked folder"])
-@pytest.mark.parametrize("options", [(), ("--disk",)])
+@pytest.mark.parametrize("options", [(), ("--light",)])
 def test_render_never_writes_what_it_reads(folder, capsys, name, spelling, options):
     output = {
         "itself": folder / name,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from physics import BlackHoleError, bake, disk_layers, read_exr, render_reference, write_exr
+from physics import BlackHoleError, bake, read_exr, render_reference, write_exr
 from physics.cli import main, make_parser
 
 ROOT = Path(__file__).parents[3]
@@ -20,18 +20,19 @@ SMALL = ("--width", "16", "--height", "9")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory, small_patterns):
     folder = tmp_path_factory.mktemp("folder")
     write_exr(folder / "sky.exr", np.full((16, 32, 3), 0.25, np.float32))
-    assert main(["bake", str(folder / "map.exr"), *SMALL, "--radius", "30", "--disk", "--disk-crossings", "1"]) == 0
+    disk = ("--radius", "30", "--disk", "--disk-crossings", "1", "--light")
+    assert main(["bake", str(folder / "map.exr"), *SMALL, *disk]) == 0
     return folder
 
 
 def command(folder, name):
     """Arguments of a command that writes ``folder/out`` and so on."""
     return {
-        "bake": ["bake", str(folder / "out.exr"), *SMALL, "--disk"],
-        "render": ["render", *(str(folder / each) for each in ("map.exr", "sky.exr", "out.png")), "--disk"],
+        "bake": ["bake", str(folder / "out.exr"), *SMALL, "--disk", "--light"],
+        "render": ["render", *(str(folder / each) for each in ("map.exr", "sky.exr", "out.png")), "--light"],
         "accuracy": ["accuracy", str(folder / "map.exr"), "--samples", "20"],
         "verify": ["verify", str(folder)],
     }[name]
@@ -87,7 +88,8 @@ def test_numbers_far_out_are_refused_or_taken(folder, capsys, tmp_path, name, op
     ("name", "option", "value"),
     [
         ("bake", "--radius", "5e-324"),
-        ("render", "--disk-time", "1e13"),
+        ("bake", "--light-time", "1e13"),
+        ("bake", "--light-depth", "-1"),
         ("accuracy", "--seed", "-1"),
         ("accuracy", "--seed", "9" * 400),
         ("accuracy", "--samples", "9" * 400),
@@ -127,16 +129,6 @@ def test_the_reference_renderer_takes_finite_settings(settings):
     sky = np.ones((8, 16, 3), np.float32)
     with pytest.raises(BlackHoleError):
         render_reference(bake(shot(8, 4)), sky, **settings)
-
-
-def test_the_disk_is_drawn_at_a_finite_time():
-    from shots import shot
-
-    from physics import DISK_PRESETS, Disk, disk_texture
-
-    baked = bake(shot(8, 4, radius=30.0, disk=Disk(crossings=1)))
-    with pytest.raises(BlackHoleError, match="time"):
-        disk_layers(baked.disk_passes, DISK_PRESETS["physical"], disk_texture(), math.nan)
 
 
 # --- streams ----------------------------------------------------------------------------------------

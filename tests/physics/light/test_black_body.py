@@ -47,11 +47,3 @@ def test_hottest_and_coldest() -> None:
     np.testing.assert_allclose(black_body.rgb(1e12), 1e3 * black_body.rgb(1e9), rtol=1e-6)
     assert black_body.luminance([0.0, 99.0]).tolist() == [0.0, 0.0]
     assert (np.diff(black_body.luminance(np.geomspace(100.0, 1e10, 999))) > 0.0).all()
-
-
-def test_temperature_from_the_ratio_of_red_to_blue() -> None:
-    temperatures = np.geomspace(1960.0, 1e5, 60)
-    np.testing.assert_allclose(black_body.temperature_from_rgb(7.0 * black_body.rgb(temperatures)), temperatures, 1e-5)
-    wrong = [[0.0, 1.0, 0.0], [-1.0, 0.0, 1.0], [np.inf, 1.0, 1.0], [1.0, 1.0, np.nan]]
-    assert np.isnan(black_body.temperature_from_rgb(wrong)).all()
-    assert black_body.temperature_from_rgb([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) == pytest.approx([1950.0, 1e6], rel=1e-3)

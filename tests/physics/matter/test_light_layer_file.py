@@ -41,7 +41,7 @@ def test_a_layer_comes_back_as_it_was_written(folder, tmp_path):
     write_light_layer(tmp_path / "again.exr", layer)
     again = read_light_layer(tmp_path / "again.exr")
     np.testing.assert_array_equal(again.light, layer.light)
-    np.testing.assert_array_equal((1.0 - again.transmittance), (1.0 - layer.transmittance))
+    np.testing.assert_array_equal(again.transmittance, layer.transmittance)
     assert again.metadata == layer.metadata
     assert physics.check_map(tmp_path / "again.exr", FORMAT).state is physics.MapState.VALID
 
@@ -51,7 +51,7 @@ def test_render_lays_the_layer_over_the_sky(folder):
         assert command("render", folder / "map.exr", folder / "sky.exr", folder / f"{name}.exr", *options) == 0
     bare, lit = (physics.read_exr(folder / f"{name}.exr")[0][..., :3] for name in ("bare", "lit"))
     layer = read_light_layer(folder / "map_light.exr")
-    np.testing.assert_allclose(lit, layer.light + (layer.transmittance[..., None]) * bare, atol=1e-5)
+    np.testing.assert_allclose(lit, layer.light + layer.transmittance[..., None] * bare, atol=1e-5)
 
 
 def test_a_layer_of_another_map_is_refused(folder, tmp_path, capsys):
@@ -66,7 +66,8 @@ def test_damaged_layers_are_refused(folder, tmp_path):
     layer = read_light_layer(folder / "map_light.exr")
     for wrong in (
         dataclasses.replace(layer, light=-layer.light),
-        dataclasses.replace(layer, opacity=(1.0 - layer.transmittance) + 0.5),
+        dataclasses.replace(layer, transmittance=0.0 * layer.transmittance),
+        dataclasses.replace(layer, transmittance=1.5 * layer.transmittance),
         dataclasses.replace(layer, metadata={**layer.metadata, "time": 13.0}),
         dataclasses.replace(layer, metadata={**layer.metadata, "look": {"depth": -1.0}}),
     ):
