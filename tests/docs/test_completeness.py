@@ -27,7 +27,7 @@ def test_command_line_options_are_described():
 
 
 # Settings that no panel shows: what the add-on keeps for itself.
-UNSEEN = {"foreground_scene", "map_names"}
+UNSEEN = {"foreground_scene", "look_version", "map_names"}
 
 
 def properties():
