@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics import read_warp_map
+from physics import read_light_layer, read_warp_map
 from physics.images import exr
 from physics.reference import reference_render
 
@@ -190,17 +190,23 @@ def test_file_stands_alone(scene: object, tmp_path: Path) -> None:
 def test_orbit_with_a_disk_shares_its_rays(
     scene: object, addon_module: Callable[[str], ModuleType], tmp_path: Path
 ) -> None:
-    """Only the first frame is traced; the disk is in the picture, and bright."""
+    """Only the first frame is traced; the picture has the layer's light, which outshines the sky."""
     import bpy
 
     scene.frame_end = 2
     assert bpy.ops.umbra.bake_animation() == {"FINISHED"}
-    first, second = sorted(path for path in (tmp_path / "maps").glob("*.exr") if "_disk" not in path.name)
+    first, second = sorted(path for path in (tmp_path / "maps").glob("*.exr") if "_light" not in path.name)
     assert read_warp_map(first).metadata["counts"]["rays"] > 0
     assert read_warp_map(second).metadata["counts"]["rays"] == 0
-    assert len(list((tmp_path / "maps").glob("*_disk*.exr"))) == 6
-    picture = _render(scene, tmp_path / "picture.exr")
-    assert np.mean(picture[..., :3].max(axis=-1) > 0.5) > 0.1
+    layers = sorted((tmp_path / "maps").glob("*_light*.exr"))
+    assert len(layers) == 2
+    scene.frame_set(1)
+    picture = _render(scene, tmp_path / "picture.exr")[..., :3]
+    disk = scene.umbra.active_hole.umbra.disk
+    light = read_light_layer(layers[0]).light * np.array(disk.tint) * (2.0**disk.exposure * disk.opacity)
+    assert np.all(picture >= light * (1.0 - TOLERANCE_EVERYWHERE))
+    assert light.sum() > 0.5 * picture.sum()
+    assert np.mean(picture.max(axis=-1) > 0.25) > 0.1
 
 
 def seen_objects(scene: object, addon_module: Callable[[str], ModuleType]) -> tuple[np.ndarray, np.ndarray]:
