@@ -154,7 +154,7 @@ class FolderNames:
         return self.folder / whole
 
     def superseded(self, wanted: MapRequest) -> tuple[Path, ...]:
-        """Files of the same frame, size and kind that the request has no use for: older maps, and passes too many."""
+        """Files of the same frame and size that the request has no use for: older maps of its kind, passes, layers."""
         match = self._pattern.fullmatch(wanted.path.name)
         if match is None:
             return ()
@@ -164,8 +164,10 @@ class FolderNames:
             self.folder / each.string
             for each in others
             if each.string not in own
-            and kind_of(each) is wanted.kind
-            and (wanted.kind.is_hashed or each["beside"] is not None)
+            and (
+                kind_of(each).is_layer
+                or (kind_of(each) is wanted.kind and (wanted.kind.is_hashed or each["beside"] is not None))
+            )
         )
 
 

@@ -43,6 +43,9 @@ class MapKind:
     has_companions: bool = False
     """Whether other files lie beside the map and are one with it, such as a disk's passes."""
 
+    is_layer: bool = False
+    """Whether it is laid over the picture of another map: without a request for it, it is not needed any more."""
+
     @property
     def hash_mark(self) -> str:
         """What stands before the hash in a file's name."""
@@ -61,9 +64,14 @@ WORLD_MAP = MapKind(
     "world map", physics.WORLD_MAP_FORMAT, physics.bake_world_map_steps, physics.write_world_map, mark="world_"
 )
 LIGHT_LAYER = MapKind(
-    "layer of light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="light_"
+    "layer of light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="light_", is_layer=True
 )
 WORLD_LIGHT = MapKind(
-    "world light", physics.LIGHT_LAYER_FORMAT, _light_steps, physics.write_light_layer, mark="world_light_"
+    "world light",
+    physics.LIGHT_LAYER_FORMAT,
+    _light_steps,
+    physics.write_light_layer,
+    mark="world_light_",
+    is_layer=True,
 )
 KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER, WORLD_LIGHT]

@@ -57,7 +57,7 @@ def test_a_spoiled_map_is_found(addon_module: Callable[[str], ModuleType], scene
 
 
 def test_disk_and_lens_are_checked_too(addon_module: Callable[[str], ModuleType], scene: bpy.types.Scene) -> None:
-    scene.umbra.active_hole.umbra.disk.enabled = True
+    scene.umbra.active_hole.umbra.disk.enabled = scene.umbra.disk_passes = True
     bpy.ops.umbra.bake_frame()
     assert check(addon_module, scene).disk[0].compared > 20
     scene.umbra.active_hole.umbra.disk.enabled = False

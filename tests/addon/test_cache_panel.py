@@ -73,11 +73,11 @@ def test_exit_maps(scene: bpy.types.Scene, tmp_path: Path, panel: ModuleType) ->
 def test_passes_that_are_not_needed_any_more(scene: bpy.types.Scene, tmp_path: Path) -> None:
     hole = add_hole(scene)
     scene.frame_end = 1
-    hole.umbra.disk.enabled = True
+    hole.umbra.disk.enabled = scene.umbra.disk_passes = True
     bpy.ops.umbra.bake_animation()
     hole.umbra.disk.enabled = False
     bpy.ops.umbra.bake_animation()
-    assert len(list((tmp_path / "maps").iterdir())) == 4
+    assert len(list((tmp_path / "maps").iterdir())) == 5
     bpy.ops.umbra.clean_maps()
     assert [plain_name(path) for path in (tmp_path / "maps").iterdir()] == ["Scene_Black_Hole_64x36_0001.exr"]
 

@@ -227,8 +227,9 @@ def test_the_disk_before_the_shadow_stays(
     depth = 7.0 if hidden else 5.0
     values = {"Environment": (0.7, 0.5, 0.3, 1.0), "Redshift Color": 0.0, "Redshift Brightness": 0.0}
     values |= {"Depth": depth, "Hole Depth": 6.0, "Hide Behind": 1.0}
+    passes = np.concatenate([disk[..., :3], 1.0 - disk[..., 3:]], axis=-1)
     picture = GroupRenderer(node_group, tmp_path).render(
-        (width, height), warp_map=warp_map, foreground=scene, disk=disk, values=values
+        (width, height), warp_map=warp_map, foreground=scene, disk=passes, values=values
     )
 
     def over(front: np.ndarray, back: np.ndarray) -> np.ndarray:

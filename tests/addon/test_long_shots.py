@@ -77,6 +77,8 @@ def check_folder(folder: Path, package: ModuleType) -> dict[str, int]:
             continue
         if "_disk" in path.name:
             package.read_disk_pass(path)
+        elif "_light_" in path.name:
+            package.read_light_layer(path)
         else:
             package.read_warp_map(path)
             found[path.name] = path.stat().st_mtime_ns
@@ -91,7 +93,8 @@ def test_a_bake_that_is_killed_again_and_again(
     blend: str, tmp_path: Path, addon_module: Callable[[str], ModuleType]
 ) -> None:
     """Killed with a file half written, before one gets its name, between passes and map, and from outside."""
-    bpy.context.scene.umbra.active_hole.umbra.disk.enabled = True  # four files a frame
+    bpy.context.scene.umbra.active_hole.umbra.disk.enabled = True
+    bpy.context.scene.umbra.disk_passes = True  # five files a frame
     bpy.ops.wm.save_mainfile()
     package = addon_module("core.physics_api").physics
     folder = tmp_path / "umbra_maps"
