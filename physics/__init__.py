@@ -82,7 +82,7 @@ from .light.sky_levels import LARGEST_HALF, SkyLevels, sky_levels
 from .light.sky_levels import MARGIN as SKY_LEVEL_MARGIN
 from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
 from .light.sky_settings import SKY_FILTER, SKY_SETTINGS
-from .light.star_sky import Stars, load_stars, star_sky
+from .light.star_sky import Stars, load_stars, milky_way_sky, star_sky
 from .maps.disk_passes import DiskPasses
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
 from .maps.footprint import footprint
@@ -128,8 +128,9 @@ from .shot.map_parameters import (
     looking_at_hole,
     unstable_orbit_warning,
 )
-from .stars.catalog_file import read_star_catalog
-from .stars.star_layer import StarBaker, StarLayer, StarSettings
+from .stars.catalog_file import catalog_digest, read_star_catalog
+from .stars.star_layer import StarBaker, StarLayer
+from .stars.star_settings import StarParameters, StarSettings, star_view
 
 __all__ = [
     "ANGLE_SLACK",
@@ -211,6 +212,7 @@ __all__ = [
     "SkyLevels",
     "StarBaker",
     "StarLayer",
+    "StarParameters",
     "StarSettings",
     "Stars",
     "TraceResult",
@@ -228,6 +230,7 @@ __all__ = [
     "black_body_color",
     "black_body_luminance",
     "black_body_rgb",
+    "catalog_digest",
     "check_accuracy",
     "check_map",
     "clock_rate",
@@ -251,6 +254,7 @@ __all__ = [
     "local_velocity",
     "looking_at_hole",
     "matter_direction",
+    "milky_way_sky",
     "orbital_frequency",
     "page_thorne_flux",
     "pass_path",
@@ -281,6 +285,7 @@ __all__ = [
     "share_of",
     "sky_levels",
     "star_sky",
+    "star_view",
     "stars_path",
     "temporary_target",
     "trace_disk",

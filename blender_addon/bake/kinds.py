@@ -18,10 +18,19 @@ def forget_shared_rays() -> None:
     """Free the memory of what maps have in common, when a bake or a render is over."""
     _baker.clear()
     _light_baker.clear()
+    _star_baker.clear()
 
 
 def _warp_map_steps(parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WarpMap]":
     return (yield from _baker.now.steps(parameters))
+
+
+# Stars share their search between frames.
+_star_baker = SESSION.value(physics.StarBaker, Life.RENDER)
+
+
+def _star_layer_steps(parameters: "physics.StarParameters") -> "Generator[float, None, physics.StarLayer]":
+    return (yield from _star_baker.now.steps(parameters))
 
 
 @dataclass(frozen=True)
@@ -74,4 +83,5 @@ WORLD_LIGHT = MapKind(
     mark="world_light_",
     is_layer=True,
 )
-KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER, WORLD_LIGHT]
+STAR_LAYER = MapKind("layer of stars", physics.STARS_FORMAT, _star_layer_steps, physics.write_stars, mark="stars_")
+KINDS = [WARP_MAP, EXIT_MAP, WORLD_MAP, LIGHT_LAYER, WORLD_LIGHT, STAR_LAYER]

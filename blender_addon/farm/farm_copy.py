@@ -20,6 +20,7 @@ from ..outputs import registry
 from ..outputs.protocol import FrameCarrier, Track
 from ..outputs.shared import disk_light
 from ..scene import frame_setup
+from . import catalog_copy
 
 # What is animated, and its values by frame.
 Tracks = dict[Track, dict[int, float]]
@@ -65,7 +66,7 @@ def save(scene: bpy.types.Scene, frames: range) -> Generator[float, None, Path]:
     drivers = list(_drivers_of_settings())
     carrier = registry.of(scene).carrier(scene)
     tracks = yield from _read(scene, frames, drivers, carrier)
-    with _written(scene, frames, tracks, carrier, drivers):
+    with catalog_copy.brought_along(scene, path), _written(scene, frames, tracks, carrier, drivers):
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
         except RuntimeError as error:

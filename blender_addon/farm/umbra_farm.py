@@ -34,7 +34,7 @@ LENS = "umbra_lens_before"
 WORLD_MAP = "umbra_world_map"
 LIGHT = "umbra_disk_light"
 COPIED_FRAMES = "umbra_farm_frames"
-READ_BY_FRAME = re.compile(r"map|disk_layer|disk_pass_\d+")
+READ_BY_FRAME = re.compile(r"map|disk_layer|disk_pass_\d+|stars")
 SEQUENCE_LENGTH = 1_000_000
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
@@ -122,7 +122,7 @@ def map_images(scene: bpy.types.Scene) -> Iterator[bpy.types.Image]:
 
 
 def map_files(scene: bpy.types.Scene, frame: int) -> Iterator[Path]:
-    """The files that are read for a frame: a warp map and the disk's layer of light, or a world map."""
+    """The files that are read for a frame: a warp map, the layers of light and of stars, or a world map."""
     for image in map_images(scene):
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
         beginning = path.stem.rstrip("0123456789")

@@ -29,6 +29,9 @@ Sky Levels
     not filtered.
 Footprint
     An Image node with the baked EXR beside the warp map's, set like that. If it is not linked, the sky is not filtered.
+Stars
+    An Image node with a baked layer of stars (`physics.StarLayer`), set like the warp map's, of the render's size. If
+    it is not linked, no points are drawn, and the stars are those of the environment.
 Environment Rotation, Environment Strength
     The values of the World's Mapping node (type Point) and of its Background node.
 
@@ -49,7 +52,7 @@ from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 6
+GROUP_VERSION = 7
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
@@ -129,6 +132,22 @@ FOOTPRINT = SocketSpec(
     default=(0.0, 0.0, 0.0, 0.0),
     hide_value=True,
 )
+STARS = SocketSpec(
+    "Stars",
+    "NodeSocketColor",
+    "The baked layer of stars as points (Non-Color), which is added to the sky. Magenta in the picture means that it "
+    "is missing",
+    default=(0.0, 0.0, 0.0, 1.0),
+    hide_value=True,
+)
+STAR_BRIGHTNESS = SocketSpec(
+    "Star Brightness",
+    "NodeSocketFloat",
+    "Stops by which the stars are brighter than real ones beside the same sky",
+    default=0.0,
+    minimum=-20.0,
+    maximum=20.0,
+)
 IMAGE = SocketSpec("Image", "NodeSocketColor", "The scene in front of the black hole and the sky", in_out="OUTPUT")
 SKY = SocketSpec("Sky", "NodeSocketColor", "The black hole, its disk and the sky without the scene", in_out="OUTPUT")
 SHADOW = SocketSpec(
@@ -157,6 +176,8 @@ INPUTS = (
     HIDE_BEHIND,
     LEVELS,
     FOOTPRINT,
+    STARS,
+    STAR_BRIGHTNESS,
 )
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
@@ -178,6 +199,8 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
         hide_behind=values[HIDE_BEHIND.name],
         levels=values[LEVELS.name],
         footprint=values[FOOTPRINT.name],
+        stars=values[STARS.name],
+        star_brightness=values[STAR_BRIGHTNESS.name],
     )
     results = black_hole_nodes.build(builder, inputs, looks)
     return {

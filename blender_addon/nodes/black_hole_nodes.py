@@ -19,7 +19,7 @@ from .filtered_sky import filtered
 from .image_lookup import sample_bilinearly
 from .image_nodes import erode, separate_color
 from .redshift import redshift_gain
-from .render_size import to_render_size
+from .render_size import stretched_to_render, to_render_size
 
 # An eighth of a turn in two parts. The first has so few digits that its multiples up to 512 are exact in
 # float32, so that subtracting a multiple from an angle loses nothing; the second is what the first lacks.
@@ -53,6 +53,8 @@ class GroupInputs:
     hide_behind: Float
     levels: Vector
     footprint: Vector
+    stars: Vector
+    star_brightness: Float
 
 
 @dataclass(frozen=True)
@@ -122,10 +124,12 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
         data = combine(channels.visibility, channels.one_plus_z, channels.valid)
     with builder.frame("To the render's size"):
         sky, data = to_render_size(builder, sky, data)
+    with builder.frame("Stars"):
+        sky, has_stars = _add_stars(builder, sky, inputs)
     with builder.frame("Behind the hole"):
         behind = _behind(inputs)
     with builder.frame("Picture"):
-        return _compose(inputs, sky, data, behind)
+        return _compose(inputs, sky, data, has_stars, behind)
 
 
 def _read_map(warp_map: Vector) -> _MapChannels:
@@ -196,6 +200,18 @@ def _split_angle(angle: Float) -> _Angle:
     return _Angle(eighths, multiply_add(eighths, -_EIGHTH_TURN_FINE, rest))
 
 
+def _add_stars(builder: TreeBuilder, sky: Vector, inputs: GroupInputs) -> tuple[Vector, Float]:
+    """The sky with the layer of stars, and 1 where there is one or none is wanted, else 0.
+
+    A missing file has alpha 0. Points keep their light only where pixels are not averaged: no box filter.
+    """
+    light, alpha = stretched_to_render(builder, inputs.stars)
+    factor = 2.0 ** (inputs.exposure + inputs.star_brightness) * inputs.strength
+    is_there = alpha.greater_than(0.5).labeled("Layer there?")
+    sky = multiply_add(light, combine(factor, factor, factor), sky)
+    return where(is_there, sky, physics.INVALID_MAP_COLOR).labeled("Sky with stars"), is_there
+
+
 def _behind(inputs: GroupInputs) -> Float:
     """1 where the render is deeper than the hole and that counts, else 0.
 
@@ -209,14 +225,14 @@ def _behind(inputs: GroupInputs) -> Float:
     return deeper * clamp(inputs.hide_behind, 0.0, 1.0)
 
 
-def _compose(inputs: GroupInputs, sky: Vector, data: Vector, behind: Float) -> GroupOutputs:
+def _compose(inputs: GroupInputs, sky: Vector, data: Vector, has_stars: Float, behind: Float) -> GroupOutputs:
     """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames.
 
     Of what is behind the hole only the share of a pixel is seen that is not shadow. The rest shows the disk; there is
     no sky in it to be covered.
     """
     visibility, one_plus_z, valid = data.separate()
-    valid = valid * inputs.disk.there
+    valid = valid * inputs.disk.there * has_stars
     sky = multiply_add(sky, 1.0 - inputs.disk.covers, inputs.disk.light)
     _, _, _, alpha = separate_color(inputs.render)
     hidden = ((1.0 - visibility) * behind).labeled("Hidden")

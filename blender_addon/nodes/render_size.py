@@ -9,7 +9,7 @@ from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from ..core.physics_api import physics
 from .arithmetic import multiply_add, where
 from .builder import Float, TreeBuilder, Vector
-from .image_nodes import image_size, render_area, scale_by, scale_to_render, translate
+from .image_nodes import image_size, render_area, scale_by, scale_to_render, separate_color, translate
 
 _HALVINGS = 2
 """Two halvings and the last step by 2 reduce exactly up to 8:1: a map of 4x supersampling at half size."""
@@ -56,6 +56,13 @@ def to_render_size(builder: TreeBuilder, *images: Vector) -> tuple[Vector, ...]:
     centering = _centering(width, area_width), _centering(height, area_height)
     coverage = None if COMPOSITOR_SETTINGS_ARE_SOCKETS else _coverage(images[-1], area, centering)
     return tuple(_last_step(image, area, double, centering, coverage) for image in images)
+
+
+def stretched_to_render(builder: TreeBuilder, image: Vector) -> tuple[Vector, Float]:
+    """Return colors and alpha of an image stretched over the render's pixels; of as many pixels, as they are."""
+    area, stretched = render_area(builder), scale_to_render(image, "Nearest")
+    _, _, _, alpha = separate_color(stretched)
+    return area + stretched, area.separate()[0] + alpha
 
 
 def _coverage(image: Vector, area: Vector, centering: tuple[Float, Float]) -> Float:

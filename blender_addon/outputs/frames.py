@@ -19,6 +19,7 @@ from ..core.session import scene_of
 from ..scene import drivers, frame_setup, presence
 from ..scene.frame_setup import FrameSetup
 from ..scene.sky import environment
+from ..scene.stepping import frame_kept
 from . import registry
 from .shared import compositor_tree
 
@@ -30,12 +31,31 @@ _Work = Callable[[list[int], baking.RequestsAt, cache.FolderNames], Generator[ba
 
 def read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, measured: bool = True) -> FrameSetup:
     """Return the setup of the frame at which the dependency graph stands; see `frame_setup.read`."""
-    return frame_setup.read(scene, depsgraph, measured, registry.of(scene).traits)
+    output = registry.of(scene)
+    return output.complete(scene, depsgraph, frame_setup.read(scene, depsgraph, measured, output.traits))
 
 
 def read_at(scene: bpy.types.Scene, frame: int, view_layer: bpy.types.ViewLayer | None = None) -> FrameSetup:
-    """Return the setup of any frame; see `frame_setup.read_at`."""
-    return frame_setup.read_at(scene, frame, view_layer, registry.of(scene).traits)
+    """Return the setup of any frame; the scene is back at its current frame afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    frame : int
+        The frame to read.
+    view_layer : ViewLayer, optional
+        The layer whose objects count; the first that is rendered by default.
+
+    Raises
+    ------
+    physics.BlackHoleError
+        See `frame_setup.read`.
+    """
+    layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
+    with frame_kept(scene):
+        scene.frame_set(frame)
+        return read(scene, layer.depsgraph)
 
 
 def check_sky(scene: bpy.types.Scene) -> None:

@@ -197,6 +197,10 @@ class Output(ABC):
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
         """Return all maps that a frame needs."""
 
+    def complete(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> FrameSetup:
+        """Return a frame's setup with what only the output knows, as the dependency graph has evaluated it."""
+        return frame
+
     def request_to_check(self, scene: bpy.types.Scene, frame: FrameSetup) -> MapRequest:
         """Return the map whose accuracy can be checked.
 

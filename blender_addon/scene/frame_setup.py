@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Read what a frame needs from Blender: hole, camera and render size become `physics.WarpMapParameters`.
 
-Plain functions over evaluated data. Nothing here writes to the scene, except `read_at`, which steps to another frame
-and back.
+Plain functions over evaluated data. Nothing here writes to the scene.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +21,6 @@ from .disk_picture import picture_of
 from .enabled import is_enabled
 from .rotations import Matrix, Vector
 from .shutter import Motion
-from .stepping import frame_kept
 
 # Object matrices are float32: axes may differ in length, and from right angles, by so much from
 # rounding.
@@ -51,6 +49,8 @@ class FrameSetup:
 
     motion: Motion = Motion.NONE
     """What camera and hole do while the shutter is open; none without motion blur."""
+    star_settings: physics.StarSettings | None = None
+    """How stars are drawn, the catalog's name excepted; None where they are not points."""
 
     @property
     def distance(self) -> float:
@@ -335,36 +335,6 @@ def _light(
     light = physics.LightParameters(replace(parameters, supersampling=1), look_of(disk), time, picture_of(disk))
     light.validate()
     return light
-
-
-def read_at(
-    scene: bpy.types.Scene,
-    frame: int,
-    view_layer: bpy.types.ViewLayer | None = None,
-    traits: cameras.Traits = cameras.PLAIN,
-) -> FrameSetup:
-    """Return the setup of any frame; the scene is back at its current frame afterwards.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    frame : int
-        The frame to read.
-    view_layer : ViewLayer, optional
-        The layer whose objects count; the first that is rendered by default.
-    traits : cameras.Traits
-        What the scene's output can do.
-
-    Raises
-    ------
-    physics.BlackHoleError
-        See `read`.
-    """
-    layer = view_layer or next((each for each in scene.view_layers if each.use), scene.view_layers[0])
-    with frame_kept(scene):
-        scene.frame_set(frame)
-        return read(scene, layer.depsgraph, traits=traits)
 
 
 def frames_of(scene: bpy.types.Scene) -> range:

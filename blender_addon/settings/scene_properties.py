@@ -27,6 +27,12 @@ SKY_PROPERTIES = ("redshift_color", "redshift_brightness", "sky_temperature")
 # Items of the enum `lens_rays`.
 EXIT_MAP, IN_SHADER = "EXIT_MAP", "IN_SHADER"
 
+# Items of the enum `stars`.
+WITH_BUILT_IN_SKY, ALWAYS, NEVER = "AUTO", "ON", "OFF"
+
+NO_LIMIT = 20.0
+"""A limit of magnitude that leaves no star out."""
+
 # Items of the enum `method`.
 METHOD_NUMBERS = {"gauss-legendre": 0, "cash-karp": 1, "cash-karp-printed": 2}
 
@@ -203,6 +209,37 @@ class UmbraSceneProperties(bpy.types.PropertyGroup):
         default=False,
         update=lambda settings, _context: _refresh(settings),
         options=set(),
+    )
+    stars: bpy.props.EnumProperty(
+        name="Stars",
+        description="Whether stars are drawn as points, at their exact places and of one size at any magnification. "
+        "The built-in sky then has no stars in its texture",
+        items=(
+            (WITH_BUILT_IN_SKY, "With Built-in Sky", "Points with the built-in sky, none with others", 0),
+            (ALWAYS, "On", "Points over any sky, one of your own as well", 1),
+            (NEVER, "Off", "No points; the stars of the sky's picture are bent with it", 2),
+        ),
+        default=WITH_BUILT_IN_SKY,
+        update=lambda settings, _context: _refresh(settings),
+        options=set(),
+    )
+    star_limit: bpy.props.FloatProperty(
+        name="Faintest Magnitude",
+        description="Stars that are fainter are left out. The eye sees to 6.5, the built-in catalog goes to 8; 20 is "
+        "no limit",
+        default=NO_LIMIT,
+        min=-2.0,
+        max=NO_LIMIT,
+        soft_max=9.0,
+        precision=1,
+        options=set(),
+    )
+    star_catalog: bpy.props.StringProperty(
+        name="Catalog",
+        description="Table of stars (CSV): right ascension and declination in degrees, magnitude, B-V. Empty is the "
+        "built-in catalog of 41,411 stars",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     hide_behind: bpy.props.BoolProperty(
         name="Hide Behind the Hole",

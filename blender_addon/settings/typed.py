@@ -76,5 +76,8 @@ class SceneSettings(_Group):
     environment_source: str
     environment_image: bpy.types.Image | None
     disk_passes: bool
+    stars: str
+    star_limit: float
+    star_catalog: str
     hide_behind: bool
     auto_bake: bool

@@ -13,8 +13,9 @@ from ..maps.warp_map import WarpMap
 from ..numerics.arrays import Array
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..shot.map_parameters import WarpMapParameters
-from ..stars.catalog_file import read_star_catalog
-from ..stars.star_layer import StarBaker, StarLayer, StarSettings
+from ..stars.catalog_file import catalog_digest, read_star_catalog
+from ..stars.star_layer import StarBaker, StarLayer
+from ..stars.star_settings import StarSettings, star_view
 
 
 def add_bake_options(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +60,8 @@ def layer_of(options: argparse.Namespace, parameters: WarpMapParameters) -> Star
     settings = StarSettings(rotation=(x, y, z), magnitude_limit=getattr(options, "star_limit", math.inf))
     if catalog is None:
         return StarBaker().bake(parameters, None, settings)
-    return StarBaker().bake(parameters, read_star_catalog(catalog), replace(settings, catalog=catalog.name))
+    settings = replace(settings, catalog=catalog.name, catalog_digest=catalog_digest(catalog))
+    return StarBaker().bake(parameters, read_star_catalog(catalog), settings)
 
 
 def add_stars(options: argparse.Namespace, warp_map: WarpMap, sky: Array) -> Array:
@@ -73,7 +75,7 @@ def add_stars(options: argparse.Namespace, warp_map: WarpMap, sky: Array) -> Arr
     path = stars_path(options.map)
     layer = read_stars(path)
     wanted = WarpMapParameters.from_metadata(warp_map.metadata["parameters"])
-    if layer.metadata["hash"] != replace(wanted, supersampling=1).hash:
+    if layer.metadata["hash"] != star_view(wanted).hash:
         raise WarpMapError(f"{path} does not belong to {options.map}; bake it again.", code="map.passes-mixed")
     turned = [math.radians(angle) for angle in options.rotation]
     if any(abs(a - b) > 1e-9 for a, b in zip(layer.metadata["stars"]["rotation"], turned, strict=True)):

@@ -4,22 +4,37 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ..images.exr import PathLike
-from ..numerics.errors import WarpMapError
+from ..numerics.errors import BlackHoleError, WarpMapError
 from ..stars.star_layer import StarLayer
+from ..stars.star_settings import StarParameters, StarSettings, star_hash
 from .companion import path_beside
-from .map_file import MapFormat, advice
+from .map_file import MapFormat, advice, made_from_view
+
+
+def _is_made_from(metadata: Mapping[str, Any], wanted: StarParameters) -> bool:
+    """Return whether a file was made from these parameters by this version, but for noise."""
+    settings = _settings(metadata["umbraStars"])
+    return (
+        settings is not None
+        and metadata["umbraLayer"] == star_hash(metadata["hash"], settings)
+        and made_from_view(metadata, wanted.view)
+        and wanted.agrees_with(settings.to_metadata())
+    )
+
 
 FORMAT = MapFormat(
     "umbra stars",
-    1,
+    2,
     "a layer of stars",
-    "R, G, B: linear Rec. 709 radiance of stars, to be added to the sky; A: 0",
-    attributes=("umbraStars",),
+    "R, G, B: linear Rec. 709 radiance of stars, to be added to the sky; A: 1",
+    attributes=("umbraStars", "umbraLayer"),
+    is_made_from=_is_made_from,
 )
 
 
@@ -55,7 +70,8 @@ def write_stars(path: PathLike, layer: StarLayer) -> None:
     """
     planes = [np.ascontiguousarray(layer.image[..., channel]) for channel in range(3)]
     settings = json.dumps(layer.metadata["stars"], sort_keys=True)
-    FORMAT.write(path, (*planes, np.zeros_like(planes[0])), layer.metadata, (settings,))
+    known_by = star_hash(layer.metadata["hash"], StarSettings.from_metadata(layer.metadata["stars"]))
+    FORMAT.write(path, (*planes, np.ones_like(planes[0])), layer.metadata, (settings, known_by))
 
 
 def read_stars(path: PathLike) -> StarLayer:
@@ -77,14 +93,14 @@ def read_stars(path: PathLike) -> StarLayer:
     planes, metadata = FORMAT.read(path)
     image = np.stack(planes[:3], axis=-1).astype(np.float32)
     settings = _settings(metadata.pop("umbraStars"))
-    if settings is None or not np.isfinite(image).all() or image.min(initial=0.0) < 0.0:
+    whole = settings is not None and metadata.pop("umbraLayer") == star_hash(metadata["hash"], settings)
+    if settings is None or not whole or not np.isfinite(image).all() or image.min(initial=0.0) < 0.0:
         raise WarpMapError(advice(f"{path} is damaged: it holds values that no stars have."), code="map.damaged")
-    return StarLayer(image, {**metadata, "stars": settings})
+    return StarLayer(image, {**metadata, "stars": settings.to_metadata()})
 
 
-def _settings(text: str) -> dict[str, Any] | None:
+def _settings(text: str) -> StarSettings | None:
     try:
-        settings = json.loads(text)
-    except (ValueError, RecursionError):
+        return StarSettings.from_metadata(json.loads(text))
+    except (BlackHoleError, TypeError, ValueError, KeyError, RecursionError):
         return None
-    return settings if isinstance(settings, dict) else None

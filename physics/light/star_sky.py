@@ -226,19 +226,47 @@ def star_sky(
     BlackHoleError
         If the height or the width of the stars is out of range.
     """
-    if height < _SMALLEST_HEIGHT:
-        raise BlackHoleError(
-            f"A sky {height} texels high is too small; give at least {_SMALLEST_HEIGHT}.", code="settings.range"
-        )
+    _check_height(height)
     if not 0.3 <= star_width <= 20.0:
         raise BlackHoleError(
             f"A star width of {star_width} texels is not drawable; give one from 0.3 to 20.", code="settings.range"
         )
     stars = load_stars(magnitude_limit)
     picture = draw_stars(stars, height, star_width)
+    result: NDArray[np.float32] = (ZERO_MAGNITUDE * picture).astype(np.float32)
     if galactic_glow:
-        for start in range(0, height, _ROWS_AT_ONCE):
-            rows = np.arange(start, min(start + _ROWS_AT_ONCE, height))
-            picture[rows] += diffuse_light(texel_directions(rows, height))
-    picture *= ZERO_MAGNITUDE
-    return picture.astype(np.float32)
+        result += milky_way_sky(height)
+    return result
+
+
+def milky_way_sky(height: int = 1280) -> NDArray[np.float32]:
+    """A panorama of the Milky Way alone, the sky behind stars that are drawn as points.
+
+    Parameters
+    ----------
+    height : int
+        Height in texels, at least 16; the width is twice that.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, 2 * height, 3)
+        What `star_sky` adds to the stars.
+
+    Raises
+    ------
+    BlackHoleError
+        If the height is out of range.
+    """
+    _check_height(height)
+    picture = np.empty((height, 2 * height, 3), np.float32)
+    for start in range(0, height, _ROWS_AT_ONCE):
+        rows = np.arange(start, min(start + _ROWS_AT_ONCE, height))
+        picture[rows] = ZERO_MAGNITUDE * diffuse_light(texel_directions(rows, height))
+    return picture
+
+
+def _check_height(height: int) -> None:
+    if height < _SMALLEST_HEIGHT:
+        raise BlackHoleError(
+            f"A sky {height} texels high is too small; give at least {_SMALLEST_HEIGHT}.", code="settings.range"
+        )

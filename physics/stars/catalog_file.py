@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ from ..numerics.errors import BlackHoleError
 
 COLUMNS = ("right ascension", "declination", "magnitude", "B-V")
 BRIGHTEST, FAINTEST = -30.0, 40.0
+DIGITS = 16
 
 
 def read_star_catalog(path: str | os.PathLike[str]) -> Stars:
@@ -39,7 +43,7 @@ def read_star_catalog(path: str | os.PathLike[str]) -> Stars:
     path = Path(path)
     rows: list[tuple[float, float, float, float]] = []
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with _explained(path), path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             is_first = True
             for cells in reader:
@@ -48,12 +52,6 @@ def read_star_catalog(path: str | os.PathLike[str]) -> Stars:
                 if not (is_first and _is_heading(cells[0])):
                     rows.append(_star(cells, f"{path}, line {reader.line_num}"))
                 is_first = False
-    except FileNotFoundError as error:
-        raise BlackHoleError(f"The star catalog {path} does not exist.", code="file.missing") from error
-    except OSError as error:
-        raise BlackHoleError(
-            f"Cannot read the star catalog {path}: {(error.strerror or str(error)).lower()}.", code="file.no-access"
-        ) from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise BlackHoleError(
             f"The star catalog {path} is not a table of text (CSV in UTF-8).", code="file.bad-catalog"
@@ -62,6 +60,31 @@ def read_star_catalog(path: str | os.PathLike[str]) -> Stars:
         raise BlackHoleError(f"The star catalog {path} holds no stars.", code="file.bad-catalog")
     ascension, declination, magnitude, color_index = np.array(rows, dtype=np.float64).T
     return Stars(np.radians(ascension), np.radians(declination), magnitude, color_index)
+
+
+def catalog_digest(path: str | os.PathLike[str]) -> str:
+    """Return a digest of a catalog's content, in hexadecimal.
+
+    Raises
+    ------
+    BlackHoleError
+        If the file cannot be read.
+    """
+    with _explained(path):
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()[:DIGITS]
+
+
+@contextmanager
+def _explained(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Turn what the system says of a file into a sentence."""
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise BlackHoleError(f"The star catalog {path} does not exist.", code="file.missing") from error
+    except OSError as error:
+        raise BlackHoleError(
+            f"Cannot read the star catalog {path}: {(error.strerror or str(error)).lower()}.", code="file.no-access"
+        ) from error
 
 
 def _is_heading(cell: str) -> bool:

@@ -10,7 +10,8 @@ g = 1 / (1 + z), mu the magnification in the camera's own sky, RGB and Y the lig
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,65 +24,14 @@ from ..light import black_body
 from ..light.star_color import temperature_from_color_index
 from ..light.star_sky import ZERO_MAGNITUDE, Stars, load_stars
 from ..numerics.arrays import Array
-from ..numerics.checks import finite, number, vector
-from ..numerics.errors import BlackHoleError
 from ..numerics.sphere import cos_sin, euler_rotation, spherical_triad, unit_vectors
-from ..shot.cameras import Camera, PanoramaCamera
+from ..numerics.work import drain
 from ..shot.map_parameters import WarpMapParameters
+from .catalog_file import read_star_catalog
+from .drawing import REACH, draw
 from .refinement import Images, refine
 from .search import Mesh, find_images, mesh_for
-
-POINTS_AT_ONCE = 8192
-# A panorama wider than this, radians, joins at its sides, give or take single precision.
-FULL_CIRCLE = 6.2831
-
-WIDTH = 0.55
-"""Standard deviation of a star's Gaussian in pixels."""
-REACH = 2
-"""Pixels on each side that it is drawn in."""
-
-
-@dataclass(frozen=True)
-class StarSettings:
-    """How stars are drawn.
-
-    Parameters
-    ----------
-    rotation : tuple of float, shape (3,)
-        XYZ Euler angles (radians) of the sky, as in a Mapping node (type Point) of a World's nodes.
-    magnitude_limit : float
-        The faintest visual magnitude that is drawn; infinity for no limit.
-    color_amount, brightness_amount : float
-        0 (off) to 1 (physical): how much the redshift changes color and brightness.
-    catalog : str
-        The name of the catalog, for the file's header.
-    """
-
-    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    magnitude_limit: float = math.inf
-    color_amount: float = 1.0
-    brightness_amount: float = 1.0
-    catalog: str = "XHIP"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", vector(self.rotation, "the rotation of the sky"))
-        if not all(math.isfinite(angle) for angle in self.rotation):
-            raise BlackHoleError("The rotation of the sky must be three finite numbers.", code="settings.range")
-        if math.isnan(number(self.magnitude_limit, "the magnitude limit")):
-            raise BlackHoleError("The magnitude limit is not a number; give one such as 6.5.", code="settings.range")
-        for name in ("color_amount", "brightness_amount"):
-            if not 0.0 <= finite(getattr(self, name), "an amount of redshift") <= 1.0:
-                raise BlackHoleError(
-                    f"An amount of redshift is {getattr(self, name):g}; give it a value from 0 to 1.",
-                    code="settings.range",
-                )
-
-    def to_metadata(self) -> dict[str, Any]:
-        """Return all settings as plain JSON values; None stands for no limit of magnitude."""
-        values = {**asdict(self), "rotation": list(self.rotation)}
-        if math.isinf(self.magnitude_limit):
-            values["magnitude_limit"] = None
-        return values
+from .star_settings import StarParameters, StarSettings, star_view
 
 
 @dataclass(frozen=True)
@@ -94,7 +44,7 @@ class StarLayer:
     To be added to the sky: stars hide nothing.
     """
     metadata: dict[str, Any]
-    """``hash``, ``counts`` and ``parameters`` of the map that the layer lies beside, and ``stars``: the settings."""
+    """``hash``, ``counts`` and ``parameters``, as of a map of its view, and ``stars``: the settings."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -133,6 +83,7 @@ class StarBaker:
         self._mesh: Mesh | None = None
         self._images_key: object = None
         self._images: tuple[Images, int] | None = None
+        self._table: tuple[str, Stars] | None = None
 
     def bake(
         self, parameters: WarpMapParameters, stars: Stars | None = None, settings: StarSettings | None = None
@@ -142,7 +93,7 @@ class StarBaker:
         Parameters
         ----------
         parameters : WarpMapParameters
-            The warp map's. Supersampling and disk do not matter.
+            The warp map's. Samples, accuracy and disk do not matter.
         stars : Stars, optional
             The built-in catalog by default.
         settings : StarSettings, optional
@@ -157,12 +108,44 @@ class StarBaker:
             If no map can be made from these parameters.
         """
         settings = StarSettings() if settings is None else settings
-        plain = replace(parameters, supersampling=1)
-        plain.validate()
-        chosen = bright_stars(load_stars() if stars is None else stars, settings.magnitude_limit)
-        points, vanished = self.points(plain, chosen, settings)
-        camera = plain.camera
-        image, drawn = draw(camera, points.x, points.y, points.light)
+        return drain(self._steps(star_view(parameters), load_stars() if stars is None else stars, settings))
+
+    def steps(self, parameters: StarParameters) -> Generator[float, None, StarLayer]:
+        """Make the stars of a frame step by step.
+
+        Parameters
+        ----------
+        parameters : StarParameters
+
+        Yields
+        ------
+        float
+            The fraction done, 0 to 1.
+
+        Raises
+        ------
+        BlackHoleError
+            If no map can be made from these parameters, or the catalog cannot be read.
+        """
+        parameters.view.validate()
+        return (yield from self._steps(parameters.view, self._catalog(parameters), parameters.settings))
+
+    def _catalog(self, parameters: StarParameters) -> Stars:
+        digest = "" if parameters.table is None else parameters.settings.catalog_digest
+        if self._table is None or self._table[0] != digest:
+            stars = load_stars() if parameters.table is None else read_star_catalog(parameters.table)
+            self._table = digest, stars
+        return self._table[1]
+
+    def _steps(
+        self, view: WarpMapParameters, stars: Stars, settings: StarSettings
+    ) -> Generator[float, None, StarLayer]:
+        view.validate()
+        yield 0.0
+        chosen = bright_stars(stars, settings.magnitude_limit)
+        points, vanished = self.points(view, chosen, settings)
+        yield 0.8
+        image, drawn = draw(view.camera, points.x, points.y, points.light)
         mesh = self._mesh
         assert mesh is not None
         counts = {
@@ -173,9 +156,9 @@ class StarBaker:
             "unresolved": mesh.refused,
         }
         metadata = {
-            "hash": plain.hash,
+            "hash": view.hash,
             "counts": counts,
-            "parameters": plain.to_metadata(),
+            "parameters": view.to_metadata(),
             "stars": settings.to_metadata(),
         }
         return StarLayer(image, metadata)
@@ -264,60 +247,3 @@ def bright_stars(stars: Stars, limit: float) -> Stars:
         stars.magnitude[bright],
         stars.color_index[bright],
     )
-
-
-def draw(camera: Camera, x: Array, y: Array, light: Array) -> tuple[NDArray[np.float32], int]:
-    """Draw points of light into a picture.
-
-    Parameters
-    ----------
-    camera : Camera
-    x, y : ndarray, shape (n,)
-        Pixels from the picture's left and top.
-    light : ndarray, shape (n, 3)
-        Radiance times steradian.
-
-    Returns
-    -------
-    image : ndarray of float32, shape (height, width, 3)
-        Radiance. Times the pixels' solid angles it adds up to the light of the points, but for what lies beyond the
-        picture's border. A panorama of the full circle goes on at the other side, and beyond its poles.
-    drawn : int
-        How many points reach into the picture.
-
-    Notes
-    -----
-    Each is a Gaussian of standard deviation `WIDTH`, taken at the pixels' centers, with weights that sum to 1.
-    """
-    width, height = camera.width, camera.height
-    taps = np.arange(-REACH, REACH + 1)
-    column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
-    weights = []
-    for place, pixel in ((x, column), (y, row)):
-        weight = np.exp(-0.5 * ((taps + 0.5) - (place - pixel)[:, None]) ** 2 / WIDTH**2)
-        weights.append(weight / weight.sum(axis=1, keepdims=True))
-    rows, columns = row[:, None] + taps, column[:, None] + taps
-    is_round = isinstance(camera, PanoramaCamera) and camera.longitude_max - camera.longitude_min > FULL_CIRCLE
-    whole = (rows[:, 0] >= 0) & (rows[:, -1] < height) & (columns[:, 0] >= 0) & (columns[:, -1] < width)
-    partly = (rows[:, -1] >= 0) & (rows[:, 0] < height)
-    if not is_round:
-        partly &= (columns[:, -1] >= 0) & (columns[:, 0] < width)
-    flux = np.zeros((3, height * width))
-    for members, is_whole in ((np.flatnonzero(whole), True), (np.flatnonzero(partly & ~whole), False)):
-        for start in range(0, len(members), POINTS_AT_ONCE):
-            some = members[start : start + POINTS_AT_ONCE]
-            share = weights[1][some][:, :, None] * weights[0][some][:, None, :]
-            down, right = rows[some][:, :, None], columns[some][:, None, :]
-            if not is_whole:
-                down, right = np.broadcast_arrays(down, right)
-                if is_round:
-                    beyond = (down < 0) | (down >= height)
-                    right = np.where(beyond, right + width // 2, right) % width
-                    down = np.where(down < 0, -1 - down, np.where(down >= height, 2 * height - 1 - down, down))
-                seen = (down >= 0) & (down < height) & (right >= 0) & (right < width)
-                share, down, right = share * seen, np.where(seen, down, 0), np.where(seen, right, 0)
-            pixel = (down * width + right).ravel()
-            for channel in range(3):
-                np.add.at(flux[channel], pixel, (share * light[some, channel][:, None, None]).ravel())
-    image = np.moveaxis(flux.reshape(3, height, width), 0, -1) / camera.solid_angles()[..., None]
-    return image.astype(np.float32), int(np.count_nonzero(partly))

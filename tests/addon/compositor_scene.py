@@ -168,6 +168,7 @@ class GroupRenderer:
         looks: int = 0,
         levels: FloatArray | None = None,
         footprint: FloatArray | None = None,
+        stars: FloatArray | None = None,
     ) -> FloatArray:
         scene = empty_scene(*size, percentage)
         tree, target = compositor_tree(scene)
@@ -178,6 +179,7 @@ class GroupRenderer:
             "Render": foreground,
             "Sky Levels": levels,
             "Footprint": footprint,
+            "Stars": stars,
             "Disk": disk,
         }
         for name, pixels in pictures.items():

@@ -154,8 +154,9 @@ assert "neither read nor written" in " ".join(each.text for each in status.lines
 print("panel says it", flush=True)
 scene.render.filepath = str(folder / "picture.exr")
 other = bpy.data.scenes.new("Other")
-environment = import_module(umbra.__name__ + ".scene.sky.environment")
-(environment._cache_folder() / environment._STAR_SKY_FILE).unlink(missing_ok=True)  # of an earlier test
+star_sky = import_module(umbra.__name__ + ".bake.star_sky")
+kept = Path(bpy.utils.extension_path_user(umbra.__name__, create=True))
+(kept / star_sky.FILE).unlink(missing_ok=True)  # of an earlier test
 with bpy.context.temp_override(scene=other):
     refused(bpy.ops.umbra.add_black_hole)  # with its sky of stars, which is a file
 bpy.ops.render.render(write_still=True)

@@ -57,6 +57,8 @@ def test_sockets_are_complete_described_and_in_order(node_group: ModuleType) -> 
         "Hide Behind",
         "Sky Levels",
         "Footprint",
+        "Stars",
+        "Star Brightness",
     ]
     assert [item.name for item in outputs] == ["Image", "Sky", "Shadow", "Redshift"]
     assert all(len(item.description) > 20 for item in inputs + outputs)

@@ -20,6 +20,8 @@ def star_sky(addon_module: Callable[[str], ModuleType], monkeypatch: pytest.Monk
     module = addon_module("bake.star_sky")
     monkeypatch.setattr(module, "HEIGHT", HEIGHT)
     monkeypatch.setattr(module, "FILE", f"umbra_stars_{HEIGHT}.exr")
+    monkeypatch.setattr(module, "MILKY_WAY_HEIGHT", HEIGHT)
+    monkeypatch.setattr(module, "MILKY_WAY_FILE", f"umbra_milky_way_{HEIGHT}.exr")
     return module
 
 
@@ -158,7 +160,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused(
     assert scene.umbra.environment_image is None
     assert scene.umbra.active_hole is None
     assert star_sky.STAR_SKY_NAME not in bpy.data.images
-    monkeypatch.setattr(star_sky, "_kept", lambda: None)
+    monkeypatch.setattr(star_sky, "_kept", lambda _name: None)
     scene.umbra.map_folder = str(tmp_path / "maps")
     add_hole(scene, sky=False)
     assert place_of(scene) == tmp_path / "maps" / star_sky.FILE

@@ -38,7 +38,7 @@ from ..shared.tree_editing import (
     output_node,
     remove_tree,
 )
-from . import depth, sky_filter
+from . import depth, sky_filter, stars
 from .compositor_sync import refresh
 
 BEFORE = "umbra_before"
@@ -224,6 +224,7 @@ def _unlink(scene: bpy.types.Scene, tree: bpy.types.NodeTree, *, tree_is_new: bo
     if setup is not None:
         disk_sync.remove(tree)
         sky_filter.remove(tree)
+        stars.remove(tree)
     depth.remove(scene)
     for group in find_nodes(tree, GROUP):
         give_back(tree, group, "Render")

@@ -6,18 +6,19 @@ from typing import Any
 import bpy
 
 from ...bake.folder import folder
-from ...bake.kinds import LIGHT_LAYER, WARP_MAP
+from ...bake.kinds import LIGHT_LAYER, STAR_LAYER, WARP_MAP
 from ...bake.names import sequence_path
 from ...core.errors import SceneError
+from ...core.physics_api import physics
 from ...nodes import black_hole_group
 from ...scene import cameras, frame_setup
 from ...scene.sky import environment, sky_frames
 from ...scene.sky.node_paths import Place
 from ...settings.scene_properties import looks_of
 from ..shared import disk_light, disk_sync
-from ..shared.compositor_tree import FOOTPRINT, Setup, find_node, find_setup, find_tree, takes_sky_from_settings
+from ..shared.compositor_tree import FOOTPRINT, STARS, Setup, find_node, find_setup, find_tree, takes_sky_from_settings
 from ..shared.map_images import NO_MAP, file_image, plain_layer, plain_map, read_sequence
-from . import depth, disk, sky_filter
+from . import depth, disk, sky_filter, stars
 
 MAP_IMAGE_NAME = "Umbra Warp Map"
 
@@ -55,6 +56,7 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
     repair(scene, thorough=False)
     if setup.tree.library is None:
         sky_filter.refresh_nodes(scene, setup)
+    refresh_stars(scene)
     disk_light.refresh(scene, frame_setup.find_active_hole(scene))
     disk.refresh(scene)
     depth.refresh(scene)
@@ -65,9 +67,16 @@ def refresh(scene: bpy.types.Scene, notes: list[str] | None = None) -> None:
             notes.append(error.for_user())
     try:
         sync_sky(scene)
-    except SceneError as error:
+    except physics.BlackHoleError as error:
         if notes is not None:
             notes.append(error.for_user())
+
+
+def refresh_stars(scene: bpy.types.Scene) -> None:
+    """Put the node that reads stars into an existing set-up, or take it out, as the settings say."""
+    setup = find_setup(scene)
+    if setup is not None and setup.tree.library is None:
+        stars.refresh_node(scene, setup)
 
 
 def point_at_maps(scene: bpy.types.Scene) -> None:
@@ -83,26 +92,29 @@ def point_at_maps(scene: bpy.types.Scene) -> None:
     width, height = cameras.render_size(scene.render)
     size = (width * samples, height * samples)
     light = sequence_path(scene, hole.name, (width, height), LIGHT_LAYER)
-    _set_paths(scene, sequence_path(scene, hole.name, size, WARP_MAP), light)
+    points = sequence_path(scene, hole.name, (width, height), STAR_LAYER)
+    _set_paths(scene, sequence_path(scene, hole.name, size, WARP_MAP), light, points)
 
 
 def point_at_nothing(scene: bpy.types.Scene) -> None:
     """Let the nodes read no map at all: the picture is magenta until a valid map is in place."""
     nothing = folder(scene).blender_path + NO_MAP
-    _set_paths(scene, nothing, nothing)
+    _set_paths(scene, nothing, nothing, nothing)
 
 
 def point_at_plain_map(scene: bpy.types.Scene) -> None:
-    """Let the nodes read, at this frame, a map that bends nothing, and no disk."""
-    _set_paths(scene, plain_map(scene.frame_current), plain_layer(scene.frame_current))
+    """Let the nodes read, at this frame, a map that bends nothing, no disk and no stars."""
+    plain = plain_layer(scene.frame_current)
+    _set_paths(scene, plain_map(scene.frame_current), plain, plain)
 
 
-def _set_paths(scene: bpy.types.Scene, path: str, light_path: str) -> None:
+def _set_paths(scene: bpy.types.Scene, path: str, light_path: str, stars_path: str) -> None:
     setup = find_setup(scene)
     if setup is None or setup.map is None:
         return
     read_sequence(setup.map, MAP_IMAGE_NAME, path)
     disk_sync.point_at(setup.tree, light_path)
+    stars.point_at(setup.tree, stars_path)
     sky_filter.point_at_footprints(setup.tree, path)
 
 
@@ -120,8 +132,8 @@ def map_nodes(scene: bpy.types.Scene) -> list[bpy.types.Node]:
     setup, tree = find_setup(scene), find_tree(scene)
     if tree is None:
         return []
-    footprint = find_node(tree, FOOTPRINT)
-    found = [None if setup is None else setup.map, footprint, find_node(tree, disk_sync.LAYER)]
+    beside = [find_node(tree, role) for role in (FOOTPRINT, disk_sync.LAYER, STARS)]
+    found = [None if setup is None else setup.map, *beside]
     return [node for node in found if node is not None]
 
 
@@ -141,17 +153,18 @@ def sync_sky(scene: bpy.types.Scene) -> None:
         return
     sky = environment.read(scene)
     node: Any = setup.sky
-    is_new = node.image != sky.image
+    image = stars.texture(scene, setup, sky.image)
+    is_new = node.image != image
     if is_new:
-        node.image = sky.image
+        node.image = image
     _link_picture(setup, node)
     if sky_frames.moves(sky.image):
         if sky.texture is not None:
             sky_frames.copy_settings(sky.texture.image_user, node)
         elif is_new or node.frame_duration <= 1:  # else they are the artist's own
             sky_frames.set_defaults(sky.image, node)
-    environment.check_image(sky.image)
-    sky_filter.sync(scene, setup, sky.image)
+    environment.check_image(image)
+    sky_filter.sync(scene, setup, image)
     from_world = scene.umbra.environment_source == "WORLD"
     _follow(scene, setup, ROTATION_SOCKET, sky.rotation_at, sky.rotation, fixed=from_world)
     _follow(scene, setup, STRENGTH_SOCKET, sky.strength_at, sky.strength, fixed=from_world)

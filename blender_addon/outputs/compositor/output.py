@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 
 from ...bake import star_sky
-from ...bake.kinds import WARP_MAP
+from ...bake.kinds import STAR_LAYER, WARP_MAP
 from ...bake.request import MapRequest, request
 from ...core import messages
 from ...core.errors import SceneError
@@ -18,6 +18,7 @@ from ...scene.camera_type import check_unbent
 from ...scene.frame_setup import FrameSetup
 from ...scene.shutter import Motion
 from ...scene.sky import environment, panorama, sky_frames
+from ...settings.scene_properties import NEVER
 from ..protocol import Look, Notice, Output, refusals
 from ..shared import disk_sync, leaving, sequencer
 from ..shared.compositor_tree import (
@@ -31,7 +32,7 @@ from ..shared.compositor_tree import (
 )
 from ..shared.look import look_of_group, write_to_group
 from ..shared.tree_editing import check_shared
-from . import compositing, compositor_sync, depth, disk, objects_behind, panel, sky_filter
+from . import compositing, compositor_sync, depth, disk, objects_behind, panel, sky_filter, stars
 from .viewport import CompositorViewportMaps
 
 NOT_SET_UP = "The compositor is not set up: a render shows no black hole."
@@ -177,12 +178,15 @@ class CompositorOutput(Output):
             exposure.default_value = environment.STAR_SKY_EXPOSURE
 
     def on_load(self, scene: bpy.types.Scene) -> None:
-        """Bring a node group of an older version up to date; a sky that was not filtered stays as it is."""
+        """Bring a node group of an older version up to date; its sky is not filtered, and its stars are no points."""
         setup = find_setup(scene)
         if setup is not None and setup.tree.library is None:
             is_plain = black_hole_group.kind_of(setup.group.node_tree) == black_hole_group.group_of(0)
+            has_no_points = stars.SOCKET not in setup.group.inputs  # now: what is set below rebuilds the group
             if is_plain and not scene.umbra.is_property_set("sky_filter"):
                 scene.umbra.sky_filter = "OFF"
+            if has_no_points and not scene.umbra.is_property_set("stars"):
+                scene.umbra.stars = NEVER
             compositor_sync.repair(scene)
             compositor_sync.refresh(scene)
 
@@ -203,11 +207,14 @@ class CompositorOutput(Output):
         return True
 
     def map_requests(self, scene: bpy.types.Scene, frame: FrameSetup) -> list[MapRequest]:
-        """Return the frame's warp map, and its layer of light if it has a disk."""
+        """Return the frame's warp map, its disk's layer of light, and its layer of stars, as far as it has them."""
         view = frame.parameters if scene.umbra.disk_passes else replace(frame.parameters, disk=None)
-        needed = [request(scene, frame, WARP_MAP, view)]
-        light = disk_sync.request_of(scene, frame)
-        return needed if light is None else [*needed, light]
+        layers = (disk_sync.request_of(scene, frame), stars.request_of(scene, frame))
+        return [request(scene, frame, WARP_MAP, view), *(each for each in layers if each is not None)]
+
+    def complete(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> FrameSetup:
+        """Add how the stars are drawn."""
+        return replace(frame, star_settings=stars.settings_at(scene, depsgraph))
 
     def begin_render(self, scene: bpy.types.Scene) -> None:
         """Mend what was changed by hand inside the set-up; refuse what cannot be mended."""
@@ -218,6 +225,7 @@ class CompositorOutput(Output):
             )
         check_linked(scene)
         depth.refresh(scene)
+        compositor_sync.refresh_stars(scene)
         compositor_sync.sync_sky(scene)
         self.prepare_files(scene, may_bake=scene.umbra.auto_bake)
 
@@ -241,7 +249,7 @@ class CompositorOutput(Output):
         wanted, *others = self.map_requests(scene, frame)
         warnings = _unresolved(wanted, frame)
         for other in others:
-            warnings += disk_sync.unresolved(other)
+            warnings += stars.unresolved(other) if other.kind is STAR_LAYER else disk_sync.unresolved(other)
         compositor_sync.check_frame(scene)
         compositor_sync.point_at_maps(scene)
         return warnings
@@ -292,7 +300,7 @@ class CompositorOutput(Output):
         if setup is None:
             return [Notice(NOT_SET_UP, "ERROR", "umbra.setup_compositor")]
         found = [environment.world_left_out(scene), environment.alpha_note(scene, may_load=False)]
-        found.append(sky_filter.notice(scene, setup))
+        found += [sky_filter.notice(scene, setup), stars.notice(scene, setup)]
         if scene.umbra.hide_behind and not depth.is_in_use(scene):
             found.append(NO_DEPTH)
         behind = objects_behind.find(scene, depsgraph)

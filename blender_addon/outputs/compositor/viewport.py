@@ -7,9 +7,9 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.physics_api import physics
 from ..shared import disk_sync
-from ..shared.compositor_tree import FOOTPRINT, Setup, find_node, find_setup, has_scene_tree
+from ..shared.compositor_tree import FOOTPRINT, STARS, Setup, find_node, find_setup, has_scene_tree
 from ..shared.map_images import drop_live, give_back, is_live, pixels_of, show_live, show_live_again
-from . import compositor_sync
+from . import compositor_sync, stars
 
 
 class CompositorViewportMaps:
@@ -33,6 +33,9 @@ class CompositorViewportMaps:
         footprint = find_node(setup.tree, FOOTPRINT)
         if footprint is not None:
             show_live(footprint, pixels_of(*np.moveaxis(physics.footprint(made).astype(np.float32), -1, 0)))
+        layer = find_node(setup.tree, STARS)
+        if layer is not None:  # those of the files are of another view
+            show_live(layer, stars.none_at_all())
 
     def show_light(self, scene: bpy.types.Scene, layer: "physics.LightLayer") -> None:
         """Let the group read a layer of light."""

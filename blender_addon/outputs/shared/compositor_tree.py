@@ -11,9 +11,17 @@ from ...core.errors import SceneError
 # The node's custom property that says what it is for, and its values.
 ROLE = "umbra_role"
 GROUP, MAP, SKY, RENDER_LAYER, OUTPUT = "group", "map", "sky", "render_layer", "output"
-FOOTPRINT, LEVELS = "footprint", "levels"
+FOOTPRINT, LEVELS, STARS = "footprint", "levels", "stars"
 # What a node of a role is: one of another type was given the role by hand.
-TYPES = {GROUP: "GROUP", MAP: "IMAGE", SKY: "IMAGE", FOOTPRINT: "IMAGE", LEVELS: "IMAGE", RENDER_LAYER: "R_LAYERS"}
+TYPES = {
+    GROUP: "GROUP",
+    MAP: "IMAGE",
+    SKY: "IMAGE",
+    FOOTPRINT: "IMAGE",
+    LEVELS: "IMAGE",
+    STARS: "IMAGE",
+    RENDER_LAYER: "R_LAYERS",
+}
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sky around the hole: the World's, an image, or the built-in sky of real stars."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -224,11 +225,21 @@ def _value_at(copy: bpy.types.World, world: bpy.types.World, place: Place | None
         return otherwise
 
 
+def is_star_sky(image: bpy.types.Image | None) -> bool:
+    """Return whether an image is the built-in sky with its stars."""
+    return image is not None and is_named(image, STAR_SKY_NAME)
+
+
+def is_named(image: bpy.types.Image, name: str) -> bool:
+    """Return whether an image has a name, or the name with the number that Blender gives what is appended."""
+    return re.fullmatch(rf"{re.escape(name)}(\.\d+)?", image.name) is not None
+
+
 def shows_stars(scene: bpy.types.Scene) -> bool:
     """Return whether the built-in stars are the scene's sky."""
     settings = scene.umbra
     image = settings.environment_image
-    return settings.environment_source == "IMAGE" and image is not None and image.name == STAR_SKY_NAME
+    return settings.environment_source == "IMAGE" and is_star_sky(image)
 
 
 def world_left_out(scene: bpy.types.Scene) -> str | None:
@@ -269,7 +280,7 @@ def take_world(scene: bpy.types.Scene) -> bool:
     if _LEFT_OUT in scene:
         del scene[_LEFT_OUT]
     image = settings.environment_image
-    if not was_left_out or image is None or image.name != STAR_SKY_NAME:
+    if not was_left_out or not is_star_sky(image):
         return False
     settings.environment_source = "WORLD"
     return True

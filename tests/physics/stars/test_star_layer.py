@@ -11,7 +11,7 @@ from commands import run
 from shots import shot
 
 import physics
-from physics.stars.star_layer import draw
+from physics.stars.drawing import draw
 
 CAMERAS = [
     physics.PerspectiveCamera(40, 30, 20.0, shift_x=0.3, pixel_aspect_y=1.5),
