@@ -197,8 +197,9 @@ class PerspectiveCamera:
         right = (np.arange(self.width) + 0.5 - 0.5 * self.width + self.shift_x * fitted) * per_pixel
         up = ((0.5 * self.height - np.arange(self.height) - 0.5) * tall + self.shift_y * fitted) * per_pixel
         square = (right * right + 1.0) + (up * up)[:, None]
-        angles: Array = (per_pixel * per_pixel * tall) / (square * np.sqrt(square))
-        return angles
+        angles: Array = np.sqrt(square)
+        angles *= square
+        return np.divide(per_pixel * per_pixel * tall, angles, out=angles)
 
     def _scale(self) -> tuple[float, float, float]:
         """Return the tangent per pixel width, the fitted side in pixel widths, and a pixel's height in widths."""

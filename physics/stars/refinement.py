@@ -127,13 +127,12 @@ def interpolate(sky: LocalSky, x: Array, y: Array) -> tuple[Array, Array, Array]
     weights_y, slopes_y = _cubic(y - row)
     width = sky.directions.shape[1]
     first = row.astype(np.intp) * width + column.astype(np.intp) % len(sky.edge)
-    flat = sky.directions.reshape(-1, 3)
     here, along_x, along_y = np.zeros((3, 3, len(x)))
     for i in range(4):
         values = np.zeros((3, len(x)))
         slopes = np.zeros((3, len(x)))
         for j in range(4):
-            node = flat[first + (i * width + j)].T
+            node = sky.planes.take(first + (i * width + j), axis=1)
             values += weights_x[j] * node
             slopes += slopes_x[j] * node
         here += weights_y[i] * values

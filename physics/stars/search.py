@@ -25,7 +25,7 @@ COLUMNS = (256, 512, 1024)
 MOST_REFUSED = 1e-4
 
 # Stars are sorted into this many zones of equal area between the poles.
-ZONES = 1024
+ZONES = 256
 # Pairs of star and cell that are looked at together, which bounds the memory.
 PAIRS_AT_ONCE = 1 << 16
 
