@@ -10,7 +10,7 @@ from ..core import color_spaces
 from ..core.errors import SceneError
 from ..core.physics_api import physics
 from ..core.session import SESSION, Life
-from ..settings.disk_properties import shows_picture
+from ..settings.disk_properties import DENSITY, RAMP
 from ..settings.typed import DiskSettings
 
 
@@ -34,10 +34,12 @@ def picture_of(settings: DiskSettings) -> physics.Picture | None:
     if image is None:
         return None
     image = image.original if isinstance(image.original, bpy.types.Image) else image
-    key = (*_key(image), shows_picture(settings))
+    key = (*_key(image), settings.texture_use)
     if key not in _known.now:
         _known.now.clear()  # the one before, most likely
-        _known.now[key] = physics.Picture(_pixels(image), is_color=shows_picture(settings))
+        _known.now[key] = physics.Picture(
+            _pixels(image), is_color=settings.texture_use != DENSITY, is_ramp=settings.texture_use == RAMP
+        )
     return _known.now[key]
 
 

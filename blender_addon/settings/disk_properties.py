@@ -20,7 +20,7 @@ from .typed import DiskSettings
 MOST_IMAGES = physics.MOST_CROSSINGS
 
 # Items of the enum `texture_use`: how the artist's picture is used.
-DENSITY, COLOR = "DENSITY", "COLOR"
+DENSITY, COLOR, RAMP = "DENSITY", "COLOR", "RAMP"
 
 # With a new disk, the inner edge turns round in some four seconds.
 DEFAULT_SPEED = 12.0
@@ -118,6 +118,7 @@ class UmbraDiskProperties(saved_names.AcceptsFormerChoices, bpy.types.PropertyGr
         items=(
             (DENSITY, "Density", "Where it is dense, by its brightness: where it is black there is nothing", 0),
             (COLOR, "Color", "Its colors are the disk's own, not those of hot matter; its alpha is the density", 1),
+            (RAMP, "Ramp", "Its colors, from the top down, are those of the disk from its inner edge outward", 2),
         ),
         default=DENSITY,
         update=_changed,
@@ -175,11 +176,6 @@ for _name, _setting in physics.MATTER_SETTINGS.items():
     _default = getattr(physics.MATTER_PRESETS[DEFAULT_LOOK], _name)
     UmbraDiskProperties.__annotations__[_name] = property_of(_setting, _changed, _default)
 saved_names.accept(UmbraDiskProperties, saved_names.DISK)
-
-
-def shows_picture(settings: DiskSettings) -> bool:
-    """Whether the disk has the colors of the artist's picture."""
-    return settings.texture is not None and settings.texture_use == COLOR
 
 
 def disk_of(settings: DiskSettings) -> "physics.Disk | None":

@@ -119,9 +119,10 @@ class VIEW3D_PT_umbra_disk_detail(UmbraPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = _settings(context, self.layout)
         self.layout.template_ID(settings, "texture", open="image.open", text="Texture")
-        if settings.texture is not None:  # in place of the turbulence
+        if settings.texture is not None:
             self.layout.prop(settings, "texture_use")
-            return
+            if settings.texture_use != disk_properties.RAMP:
+                return  # it is in place of the turbulence
         _draw(self.layout, settings, ("strands", "smoke", "large_scale", "waves", "stretch", "pitch"))
         _draw(self.layout, settings, ("ridges", "warp", "seed"))
 

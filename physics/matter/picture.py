@@ -21,7 +21,7 @@ SMALLEST_ALPHA = np.float32(1e-4)
 class Picture:
     """A picture at all pairs of a level across and a level down, as in `rip_map`."""
 
-    def __init__(self, pixels: Array | Image, is_color: bool) -> None:
+    def __init__(self, pixels: Array | Image, is_color: bool, is_ramp: bool = False) -> None:
         """Prepare a picture.
 
         Parameters
@@ -30,6 +30,8 @@ class Picture:
             Linear Rec. 709, premultiplied by the alpha, row 0 at the top.
         is_color : bool
             Whether its colors are those of the disk and its alpha says how dense it is; else its brightness does.
+        is_ramp : bool
+            Whether only the means of its rows count: colors by radius, for a disk that keeps its turbulence.
 
         Raises
         ------
@@ -41,9 +43,12 @@ class Picture:
             raise BlackHoleError(
                 "The picture on the disk has no pixels, or values that are not numbers.", code="disk.picture"
             )
-        self.is_color = bool(is_color)
+        self.is_color, self.is_ramp = bool(is_color), bool(is_ramp)
+        if self.is_ramp:
+            pixels = pixels.mean(axis=1, keepdims=True)
         self.digest = hashlib.sha256(
-            b"%d %d %d " % (*pixels.shape[:2], self.is_color) + np.ascontiguousarray(pixels, dtype="<f4").tobytes()
+            b"%d %d %d %d " % (*pixels.shape[:2], self.is_color, self.is_ramp)
+            + np.ascontiguousarray(pixels, dtype="<f4").tobytes()
         ).hexdigest()
         row: Image = np.maximum(pixels, np.float32(0.0))
         for axis, most in ((1, LARGEST[0]), (0, LARGEST[1])):

@@ -140,7 +140,7 @@ class Surface:
         levels : tuple
             From `levels`.
         """
-        if self.picture is not None:
+        if self.picture is not None and not self.picture.is_ramp:
             return self._pictured(self.picture, log_radius, phi, log_g, time, delay, levels)
         fine, coarse = levels.fine, levels.coarse
         strands = self.fine.at(log_radius, phi, time, delay, fine)
@@ -155,7 +155,12 @@ class Surface:
         for spot in self._spots:
             heat += spot.at(log_radius, phi, time, delay) * np.float32(self.look.spot_heat)
         depth = self.radial(self.depth, log_radius) * np.exp(dense)
-        return self._light(log_radius, log_g, heat, lost_heat), depth, np.expm1(lost_dense)
+        own = None
+        if self.picture is not None:
+            span = np.float32(self.log_outer - self.log_inner)
+            place, none = (log_radius - self.log_inner) / span, np.zeros(len(phi), dtype=np.float32)
+            own = self.picture.colors(self.picture.at(place, none, levels.radial / span, none))
+        return self._light(log_radius, log_g, heat, lost_heat, own), depth, np.expm1(lost_dense)
 
     def _pictured(
         self,

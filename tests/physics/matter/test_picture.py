@@ -52,6 +52,24 @@ def test_an_even_color_comes_back():
     np.testing.assert_allclose(light, gain * [1.6, 0.8, 0.4], rtol=0.02)
 
 
+def test_a_ramp_gives_colors_by_radius_and_leaves_the_turbulence():
+    """Two rows: the inner half, in ln r, is red, the outer one blue; density and heat are those without it."""
+    pixels = np.zeros((2, 4, 4), np.float32)
+    pixels[0], pixels[1] = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)
+    ramp = Picture(pixels, is_color=True, is_ramp=True)
+    look = dataclasses.replace(EVEN, strands=0.3, smoke=1.0)
+    radius, phi = np.array([3.2, 3.2, 11.5, 11.5]), np.array([0.3, 2.0, 0.3, 2.0])
+    light, depth = shaded(look, ramp, radius, phi)
+    plain, plain_depth = shaded(look, None, radius, phi)
+    np.testing.assert_array_equal(depth, plain_depth)
+    np.testing.assert_allclose(light[:2, 1:], 0.0, atol=1e-6)
+    np.testing.assert_allclose(light[2:, :2], 0.0, atol=1e-6)
+    # The light of black bodies of both temperatures has luminances in the ratio of the ramp's lights.
+    luminance = plain @ np.array([0.2126, 0.7152, 0.0722])
+    assert luminance[0] / luminance[1] == pytest.approx(light[0, 0] / light[1, 0], rel=0.02)
+    assert luminance[2] / luminance[3] == pytest.approx(light[2, 2] / light[3, 2], rel=0.02)
+
+
 def test_brightness_is_density():
     # Where the picture is black there is nothing; light has the black body's color.
     pixels = np.zeros((1, 2, 4), np.float32)
