@@ -183,6 +183,8 @@ OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
 def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
+    with builder.frame("Disk"):
+        disk = disk_layer.disk_light(*(values[each.name] for each in disk_layer.SOCKETS))
     inputs = black_hole_nodes.GroupInputs(
         render=values[RENDER.name],
         environment=values[ENVIRONMENT.name],
@@ -193,7 +195,7 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
         redshift_color=values[REDSHIFT_COLOR.name],
         redshift_brightness=values[REDSHIFT_BRIGHTNESS.name],
         temperature=values[TEMPERATURE.name],
-        disk=disk_layer.disk_light(*(values[each.name] for each in disk_layer.SOCKETS)),
+        disk=disk,
         depth=values[DEPTH.name],
         hole_depth=values[HOLE_DEPTH.name],
         hide_behind=values[HIDE_BEHIND.name],

@@ -16,6 +16,7 @@ from ..core.physics_api import physics
 from .arithmetic import multiply_add, where
 from .builder import Float, TreeBuilder, Vector
 from .image_nodes import combine_color, separate_color
+from .render_size import stretched_to_render
 from .versioned_group import SocketSpec, Values, VersionedGroup
 
 DISK = SocketSpec(
@@ -63,13 +64,15 @@ class DiskLight:
 
 def disk_light(disk: Vector, exposure: Float, tint: Vector, opacity: Float) -> DiskLight:
     """Return what the values of `SOCKETS` give."""
-    _, _, _, passes = separate_color(disk)
-    light = disk * tint * (2.0**exposure * opacity)
+    # Layers that previews make are smaller than the render.
+    light, passes = stretched_to_render(disk.builder, disk, "Bilinear")
+    light = light * tint * (2.0**exposure * opacity)
     return DiskLight(light, (1.0 - passes) * opacity, passes.greater_than(0.0).labeled("Is there a layer?"))
 
 
-def _build(_builder: TreeBuilder, values: Values) -> Values:
-    disk = disk_light(*(values[each.name] for each in SOCKETS))
+def _build(builder: TreeBuilder, values: Values) -> Values:
+    with builder.frame("Disk"):
+        disk = disk_light(*(values[each.name] for each in SOCKETS))
     behind = values[BEHIND]
     _, _, _, alpha = separate_color(behind)
     left = 1.0 - disk.covers

@@ -58,9 +58,9 @@ def to_render_size(builder: TreeBuilder, *images: Vector) -> tuple[Vector, ...]:
     return tuple(_last_step(image, area, double, centering, coverage) for image in images)
 
 
-def stretched_to_render(builder: TreeBuilder, image: Vector) -> tuple[Vector, Float]:
+def stretched_to_render(builder: TreeBuilder, image: Vector, interpolation: str = "Nearest") -> tuple[Vector, Float]:
     """Return colors and alpha of an image stretched over the render's pixels; of as many pixels, as they are."""
-    area, stretched = render_area(builder), scale_to_render(image, "Nearest")
+    area, stretched = render_area(builder), scale_to_render(image, interpolation)
     _, _, _, alpha = separate_color(stretched)
     return area + stretched, area.separate()[0] + alpha
 

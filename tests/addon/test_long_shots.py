@@ -128,7 +128,7 @@ def test_a_bake_that_is_killed_again_and_again(
     now = check_folder(folder, package)
     assert len(now) == FRAMES
     assert {name: now[name] for name in before} == before
-    assert len(list(folder.glob("[!.]*.exr"))) == 4 * FRAMES
+    assert len(list(folder.glob("[!.]*.exr"))) == 5 * FRAMES
     assert not hidden(folder)
 
 
