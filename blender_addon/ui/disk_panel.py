@@ -85,6 +85,8 @@ class VIEW3D_PT_umbra_disk(HolePanel, bpy.types.Panel):
         layout.prop(settings, "light")
         if settings.light:
             layout.prop(settings, "light_strength")
+        if context.scene.umbra.output == "COMPOSITOR":
+            layout.prop(context.scene.umbra, "disk_passes")
 
 
 class VIEW3D_PT_umbra_disk_profile(UmbraPanel, bpy.types.Panel):
