@@ -12,6 +12,7 @@ Lenses", section 5.1); its sign is the image's parity.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,9 @@ class Images:
     """1.0, or -1.0 for mirrored images."""
 
 
-def refine(sky: LocalSky, found: Found, stars: Array) -> tuple[Images, int]:
+def refine(
+    sky: LocalSky, found: Found, stars: Array, counts: Callable[[Array, Array], Mask] | None = None
+) -> tuple[Images, int]:
     """Return images with exact places.
 
     Parameters
@@ -56,6 +59,8 @@ def refine(sky: LocalSky, found: Found, stars: Array) -> tuple[Images, int]:
         Their places in the mesh.
     stars : ndarray, shape (n, 3)
         Unit vectors toward the stars, in the frame of the table.
+    counts : callable, optional
+        Returns, for exact columns and rows of all that was found, which are wanted.
 
     Returns
     -------
@@ -70,6 +75,8 @@ def refine(sky: LocalSky, found: Found, stars: Array) -> tuple[Images, int]:
         block = slice(start, start + BLOCK)
         toward = stars[found.star[block]].T
         x[block], y[block], determinant[block], there[block] = _newton(sky, x[block], y[block], toward)
+    if counts is not None:
+        there &= counts(x, y)
     kept = np.flatnonzero(there)
     x, y, determinant = x[kept] % len(sky.edge), y[kept], determinant[kept]
     _psi, _away, area = sky.angles(x, y)

@@ -31,18 +31,25 @@ PAIRS_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
+class Bounds:
+    """What of the celestial sphere cells may cover; arrays of shape (cells,)."""
+
+    low: Array
+    """Smallest and largest z, and azimuth in turns."""
+    high: Array
+    first: Array
+    last: Array
+    """In turns, from `first` on; `last` - `first` is at most 1."""
+
+
+@dataclass(frozen=True)
 class Mesh:
     """The cells of a local sky, ready to be searched; arrays of shape (cells,) unless said otherwise."""
 
     sky: LocalSky
     row: Index
     column: Index
-    low: Array
-    """Smallest and largest z, and azimuth in turns from 0 to 1, of what a cell may cover."""
-    high: Array
-    first: Array
-    last: Array
-    """In turns, from `first` on; `last` - `first` is at most 1."""
+    bounds: Bounds
     corners: Array
     """Shape (4, 3, cells): the corners 00, 01 (next column), 10 (next row), 11."""
     sides: Array
@@ -121,7 +128,8 @@ def mesh_of(sky: LocalSky) -> Mesh:
     lost_row, lost_column = np.nonzero(~good)
     lost_area = sky.angles(lost_column + 0.5, lost_row + 0.5)[2]
     lost_light = float(lost_area.sum()) / (4.0 * math.pi)
-    return Mesh(sky, row, column, low, high, first, last, corners, sides, len(lost_row), lost_light)
+    bounds = Bounds(low, high, first, last)
+    return Mesh(sky, row, column, bounds, corners, sides, len(lost_row), lost_light)
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -145,13 +153,9 @@ def find_images(mesh: Mesh, stars: Array) -> Found:
     Found
         Places are as good as linear interpolation in a cell: some 0.01 cells, worse next to caustics.
     """
-    zone = np.minimum(((stars[:, 2] + 1.0) * (0.5 * ZONES)).astype(np.intp), ZONES - 1)
-    turn = np.arctan2(stars[:, 1], stars[:, 0]) / (2.0 * math.pi)
-    turn -= np.floor(turn)
-    key = zone + np.minimum(turn, 1.0 - 1e-12)
-    order = np.argsort(key)
-    key, sorted_stars = key[order], np.ascontiguousarray(stars[order].T)
-    cell, begin, count = _spans(mesh, key)
+    order, key = sort_stars(stars)
+    sorted_stars = np.ascontiguousarray(stars[order].T)
+    cell, begin, count = spans(mesh.bounds, key)
     parts = []
     ends = np.cumsum(count)
     start = 0
@@ -169,15 +173,25 @@ def find_images(mesh: Mesh, stars: Array) -> Found:
     return Found(order[star], x, y)
 
 
-def _spans(mesh: Mesh, key: Array) -> tuple[Index, Index, Index]:
+def sort_stars(stars: Array) -> tuple[Index, Array]:
+    """Return the order of stars by zone and azimuth, and the keys that `spans` looks up, in that order."""
+    zone = np.minimum(((stars[:, 2] + 1.0) * (0.5 * ZONES)).astype(np.intp), ZONES - 1)
+    turn = np.arctan2(stars[:, 1], stars[:, 0]) / (2.0 * math.pi)
+    turn -= np.floor(turn)
+    key = zone + np.minimum(turn, 1.0 - 1e-12)
+    order = np.argsort(key)
+    return order, key[order]
+
+
+def spans(bounds: Bounds, key: Array) -> tuple[Index, Index, Index]:
     """Return the stretches of sorted stars that cells may hold: the cell, the first star, and how many."""
-    lowest = np.clip(((mesh.low + 1.0) * (0.5 * ZONES)).astype(np.intp), 0, ZONES - 1)
-    highest = np.clip(((mesh.high + 1.0) * (0.5 * ZONES)).astype(np.intp), 0, ZONES - 1)
+    lowest = np.clip(((bounds.low + 1.0) * (0.5 * ZONES)).astype(np.intp), 0, ZONES - 1)
+    highest = np.clip(((bounds.high + 1.0) * (0.5 * ZONES)).astype(np.intp), 0, ZONES - 1)
     zones = highest - lowest + 1
     cell = np.repeat(np.arange(len(zones)), zones)
     zone = lowest[cell] + np.arange(len(cell)) - np.repeat(np.cumsum(zones) - zones, zones)
-    base = np.floor(mesh.first)
-    first, last = (mesh.first - base)[cell], (mesh.last - base)[cell]
+    base = np.floor(bounds.first)
+    first, last = (bounds.first - base)[cell], (bounds.last - base)[cell]
     begin = np.searchsorted(key, zone + first)
     end = np.searchsorted(key, zone + np.minimum(last, 1.0))
     over = np.flatnonzero(last > 1.0)

@@ -29,6 +29,7 @@ from ..numerics.work import drain
 from ..shot.map_parameters import WarpMapParameters
 from .catalog_file import read_star_catalog
 from .drawing import REACH, draw
+from .folds import with_pairs
 from .refinement import Images, refine
 from .search import Mesh, find_images, mesh_for
 from .star_settings import StarParameters, StarSettings, star_view
@@ -187,7 +188,8 @@ class StarBaker:
         toward = self._toward(parameters, stars, settings)
         key = (*key, toward.tobytes())
         if self._images is None or key != self._images_key:
-            self._images = refine(self._mesh.sky, find_images(self._mesh, toward), toward)
+            images, vanished = refine(self._mesh.sky, find_images(self._mesh, toward), toward)
+            self._images = with_pairs(self._mesh.sky, images, toward), vanished
             self._images_key = key
         images, vanished = self._images
         return self._project(parameters, images, stars, settings), vanished

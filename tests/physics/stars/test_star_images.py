@@ -18,9 +18,10 @@ from physics.kerr.observer import Observer
 from physics.kerr.rays import Rays, rays_from_triad
 from physics.numerics.sphere import celestial_coordinates, cos_sin
 from physics.sampling.view import View
+from physics.stars.folds import folded_cells, with_pairs
 from physics.stars.local_sky import local_sky
 from physics.stars.refinement import interpolate, refine
-from physics.stars.search import find_images, mesh_of
+from physics.stars.search import find_images, mesh_for, mesh_of
 from physics.stars.star_layer import StarBaker
 
 PIXELS = 1920, 1080
@@ -168,3 +169,26 @@ def test_frames_of_an_orbit_share_what_they_can() -> None:
     assert baker._mesh is table
     alone = StarBaker().bake(second)
     np.testing.assert_allclose(shared.image, alone.image, rtol=1e-3, atol=1e-6 * alone.image.max())
+
+
+def test_pairs_beside_caustics_are_found_and_none_counts_twice() -> None:
+    """Stars at the ends of rays in folded cells: an image must be where each ray begins. Triangles miss 1 in 20."""
+    mesh = mesh_for(0.9, 22.0, 1.4, 5e-4)
+    sky, columns = mesh.sky, len(mesh.sky.edge)
+    row, column = folded_cells(sky)
+    random = np.random.default_rng(1)
+    chosen = random.integers(0, len(row), 1500)
+    x = column[chosen] + random.uniform(-0.3, 1.3, 1500)
+    y = np.clip(row[chosen] + random.uniform(-0.3, 1.3, 1500), 0.01, sky.rows - 1.01)
+    toward, known = sky.trace(sky.looking(x, y))
+    x, y, toward = x[known], y[known], toward[known]
+    images, _vanished = refine(sky, find_images(mesh, toward), toward)
+    missed = []
+    for found in (images, with_pairs(sky, images, toward)):
+        across = (found.x - x[found.star] + 0.5 * columns) % columns - 0.5 * columns
+        is_there = (np.abs(across) < 0.02) & (np.abs(found.y - y[found.star]) < 0.02)
+        missed.append(1.0 - len(np.unique(found.star[is_there])) / len(x))
+        place = np.stack([found.star, found.parity, np.round(found.x, 2) % columns, np.round(found.y, 2)])
+    assert missed[0] > 0.03
+    assert missed[1] < 0.02
+    assert len(np.unique(place, axis=1).T) == len(found.star)
