@@ -21,10 +21,10 @@ RINGS = ((0.01, 0.03), (0.03, 0.1), (0.1, 0.2))
 # Pixels, at 40 degrees over 1080 rows. The window reaches 20 % of the radius to the right of the shadow.
 _WIDTH, _HEIGHT, _WINDOW, _RADIUS = 144, 180, math.radians(6.667), 270.0
 _ASIDE = math.radians(-11.0)
-_FIRST, _STEP = 20.0, 0.1
+FIRST, STEP = 20.0, 0.1
 _STRIP = 30
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 Picture = Callable[[float, np.ndarray], np.ndarray]
 """Makes a picture, shape (180, 144, 3), from the camera's azimuth in degrees and the sky."""
@@ -49,7 +49,7 @@ def hdri() -> np.ndarray | None:
 
 def looks(count: int) -> Picture:
     """One ray per pixel, and so many looks at the sky along what the pixel sees of it; 0: unfiltered."""
-    return lambda azimuth, sky: render(physics.bake(_parameters(azimuth, 1)), sky, looks=count).sky[..., :3]
+    return lambda azimuth, sky: render(physics.bake(parameters_at(azimuth, 1)), sky, looks=count).sky[..., :3]
 
 
 def rays(samples: int) -> Picture:
@@ -58,7 +58,7 @@ def rays(samples: int) -> Picture:
     def picture(azimuth: float, sky: np.ndarray) -> np.ndarray:
         strips = []
         for row in range(0, _HEIGHT, _STRIP):
-            fine = render(physics.bake(_parameters(azimuth, samples, row)), sky).sky[..., :3]
+            fine = render(physics.bake(parameters_at(azimuth, samples, row)), sky).sky[..., :3]
             strips.append(fine.reshape(_STRIP, samples, _WIDTH, samples, 3).mean(axis=(1, 3)))
         return np.concatenate(strips)
 
@@ -67,9 +67,9 @@ def rays(samples: int) -> Picture:
 
 def measure(ways: dict[str, Picture], truth: str, sky: np.ndarray, frames: int = 2) -> dict[str, list[Flicker]]:
     """Judge ways of making the picture by one of them; the result has an entry for each ring."""
-    distance = _distance_from_the_shadow()
+    distance = distance_from_the_shadow()
     light = {
-        name: np.array([way(_FIRST + _STEP * frame, sky) @ _LUMINANCE for frame in range(frames)])
+        name: np.array([way(FIRST + STEP * frame, sky) @ LUMINANCE for frame in range(frames)])
         for name, way in ways.items()
     }
     return {name: list(_judge(pictures, light[truth], distance)) for name, pictures in light.items()}
@@ -85,7 +85,7 @@ def _judge(pictures: np.ndarray, truth: np.ndarray, distance: np.ndarray) -> Ite
         )
 
 
-def _parameters(azimuth: float, samples: int, row: int | None = None) -> physics.WarpMapParameters:
+def parameters_at(azimuth: float, samples: int = 1, row: int | None = None) -> physics.WarpMapParameters:
     theta, phi = math.radians(80.0), math.radians(azimuth)
     place = tuple(30.0 * np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]))
     cosine, sine = math.cos(_ASIDE), math.sin(_ASIDE)
@@ -103,9 +103,9 @@ def _parameters(azimuth: float, samples: int, row: int | None = None) -> physics
     )
 
 
-def _distance_from_the_shadow() -> np.ndarray:
+def distance_from_the_shadow() -> np.ndarray:
     """Distance of each pixel from the shadow, in units of its radius; 0 inside."""
-    dark = physics.bake(_parameters(_FIRST, 1)).visibility == 0.0
+    dark = physics.bake(parameters_at(FIRST, 1)).visibility == 0.0
     rows, columns = np.mgrid[:_HEIGHT, :_WIDTH]
     squares = np.full(dark.shape, np.inf)
     for row, column in zip(*np.nonzero(dark), strict=True):

@@ -20,6 +20,7 @@ import maps
 import matter
 import plots
 import skies
+import stars
 import tracing
 
 # Pictures take seconds, so that a disturbance is a small part of them.
@@ -46,6 +47,7 @@ def main() -> None:
     table.add(animations.rows(options.frames, options.orbit_frames))
     table.add(lens.rows(min(options.repeats, LENS_REPEATS)))
     table.add(["", *skies.lines(min(options.repeats, LENS_REPEATS))])
+    table.add(["", *stars.lines(min(options.repeats, LENS_REPEATS))])
     table.add(["", *maps.file_lines(options.repeats)])
     table.add(["", f"peak resident memory of the whole run: {measuring.process_memory():.0f} MB"])
     if not options.no_plots:
