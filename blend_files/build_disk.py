@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 
 import scene_tools as tools
-from build_station import SKY_HEIGHT, STAR_WIDTH
 from scene_tools import Vector, bpy
-from skies import sky_rotation, star_panorama
+from skies import sky_rotation
 
 FRAMES = 96
 ORBIT = math.radians(42.0)  # of the camera about the hole, in all frames
@@ -25,8 +24,6 @@ def build() -> None:
     """Build and save the scene."""
     scene = tools.new_scene("Disk", FRAMES)
     tools.world_background(scene, (0.0, 0.0, 0.0), 0.0)
-    scene.umbra.environment_image = star_panorama(SKY_HEIGHT, STAR_WIDTH, quality=95)
-    scene.umbra.environment_source = "IMAGE"
     hole = tools.black_hole((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), SPIN, 0.2, "FIDO")
     hole.umbra.disk.enabled = True
 

@@ -33,10 +33,10 @@ class View:
 
 
 VIEWS = {
-    "disk_face_on": View(spin=0.7, distance=50.0, height=78.0, lens=31.0, outer=18.0, preset="PHYSICAL", exposure=-0.6),
+    "disk_face_on": View(spin=0.7, distance=50.0, height=78.0, lens=31.0, outer=18.0, preset="PHYSICAL", exposure=0.4),
     "disk_ten_degrees": View(spin=0.6, distance=46.0, height=9.0, lens=38.0, outer=18.0, preset="GARGANTUA"),
     "disk_close_up": View(
-        spin=0.998, distance=13.0, height=8.0, lens=19.0, outer=12.0, preset="BLUE_HOT", exposure=-0.5
+        spin=0.998, distance=13.0, height=8.0, lens=19.0, outer=12.0, preset="BLUE_HOT", exposure=0.5
     ),
 }
 
