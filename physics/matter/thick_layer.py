@@ -22,6 +22,7 @@ from ..kerr.orbiting_matter import redshift_factor
 from ..numerics.arrays import Array, Image, Index
 from ..sampling.view import View
 from ..shot.disk import Disk
+from .slow_paths import SlowPaths
 from .surface import Surface
 from .thick_paths import LayerPaths, Samples
 
@@ -76,13 +77,15 @@ def thick_layer_steps(
         pixels = np.arange(start * columns, min(start + ROWS, rows) * columns)
         row, column = np.divmod(pixels, columns)
         cosine = math.sin(math.atan(HIGHEST * _height(surface, disk.radii(spin), None)))
-        paths = LayerPaths(view.rays(column + 0.5, row + 0.5), cosine)
-        unresolved += int(np.count_nonzero(~paths.usable))
+        rays = view.rays(column + 0.5, row + 0.5)
+        swinging = LayerPaths(rays, cosine)
+        unresolved += int(np.count_nonzero(~rays.escapes))
         part = layer[pixels[0] : pixels[-1] + 1]
-        for order in range(disk.crossings):
-            chosen, low, high = paths.passes(order, *disk.radii(spin))
-            if len(chosen):
-                _add_pass(surface, paths, (chosen, low, high), part, columns, disk, spin, time, nodes)
+        for paths in (swinging, SlowPaths(rays, cosine, ~swinging.usable)):
+            for order in paths.orders(disk.crossings):
+                chosen, low, high = paths.passes(order, disk.crossings, *disk.radii(spin))
+                if len(chosen):
+                    _add_pass(surface, paths, (chosen, low, high), part, columns, disk, spin, time, nodes)
         yield min(1.0, (start + ROWS) / rows)
     return layer.reshape(rows, columns, 4), unresolved
 
@@ -98,7 +101,7 @@ def _height(surface: Surface, radii: tuple[float, float], radius: Array | None) 
 
 def _add_pass(
     surface: Surface,
-    paths: LayerPaths,
+    paths: LayerPaths | SlowPaths,
     met: tuple[Index, Array, Array],
     layer: Image,
     columns: int,
@@ -153,7 +156,7 @@ def profile(zeta: Array) -> Array:
 
 def _depths(
     surface: Surface,
-    paths: LayerPaths,
+    paths: LayerPaths | SlowPaths,
     chosen: Index,
     samples: Samples,
     disk: Disk,
@@ -174,7 +177,12 @@ def _depths(
 
 
 def _edges(
-    surface: Surface, paths: LayerPaths, met: tuple[Index, Array, Array], disk: Disk, spin: float, nodes: int
+    surface: Surface,
+    paths: LayerPaths | SlowPaths,
+    met: tuple[Index, Array, Array],
+    disk: Disk,
+    spin: float,
+    nodes: int,
 ) -> Array:
     """Return where parts of passes begin and end, shape (nodes + 1, n): of equal shares of what is seen of a smooth
     layer, `KEPT` of them by the angle alone."""
@@ -214,8 +222,11 @@ def _footprints(log_radius: Array, phi: Array, pixel: Index, count: int, columns
     place = np.full(count + columns, -1)
     place[pixel] = np.arange(len(pixel))
     radial, azimuthal = (np.nan_to_num(each) ** 2 for each in (_to_next(log_radius), _wrapped(_to_next(phi))))
+    column = pixel % columns
     for step in (1, columns):
         after, before = place[pixel + step], place[np.maximum(pixel - step, 0)]
+        if step == 1:
+            after, before = np.where(column < columns - 1, after, -1), np.where(column > 0, before, -1)
         other = np.where(after >= 0, after, np.where(before >= 0, before, np.arange(len(pixel))))
         away = np.clip(np.nan_to_num(log_radius[:, other] - log_radius), -LARGEST_STEP, LARGEST_STEP)
         turned = np.nan_to_num(_wrapped(phi[:, other] - phi))

@@ -27,13 +27,19 @@ LEAD_NODES = 12
 """Nodes of Gauss and Legendre's rule from the camera to the layer."""
 _PLACES, _WEIGHTS = (each[:, None] for each in leggauss(LEAD_NODES))
 
-CULLED_AT = np.array([0.0, 0.25, 0.5, 0.75, 1.0])[:, None]
+CULLED_AT = np.linspace(0.0, 1.0, 13)[:, None]
 LED_AT = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
 """Shares of the way to a pass at which a ray may have ended before."""
 CULLED_BEYOND = 1.05
-"""Passes are left out whose radius at these shares of them stays outside the disk by this factor."""
+"""Passes are left out whose radius at these shares of them stays outside the disk by this factor, and cut there."""
+CUT_MARGIN = 0.25
+"""Of the cuts, in steps between these shares."""
 
 LEAST_HEIGHT = 1e-12
+LEAST_PASS = 0.35
+"""Path angle below which the rest of a pass of a camera in the layer is none of its own."""
+LEAST_BASE = 1.0
+"""Rays of a smaller A run nearly straight in or out, and turn little on their way."""
 HORIZON_MARGIN = 1.0 + 1e-6
 
 
@@ -67,45 +73,76 @@ class LayerPaths:
         rise = polar.triad[1, 2] * polar.tangent_theta
         top = np.hypot(self._height, rise)
         with np.errstate(invalid="ignore"):
-            usable = (polar.base > 0.0) & (polar.ellipticity >= 0.0) & (top > LEAST_HEIGHT) & rays.escapes
+            usable = (polar.base >= LEAST_BASE) & (polar.ellipticity >= 0.0) & (top > LEAST_HEIGHT) & rays.escapes
         self.usable: Mask = usable
-        """Which rays have such a motion, shape (n,): of the others q is negative, or they have no energy."""
+        """Which rays have such a motion, shape (n,); `slow_paths` takes those of the others that have energy."""
         self.live: Index = np.flatnonzero(usable)
         self.rays, self._polar = rays.select(self.live), polar.select(self.live)
         self._rise, top = rise[self.live], top[self.live]
         self._start = np.arctan2(self._height, self._rise)
         self._reach = np.where(cosine >= top, 0.5 * math.pi, np.arcsin(np.minimum(cosine / top, 1.0)))
         self._first = np.floor((self._start - self._reach) / math.pi) + 1.0
+        # What little is left of a pass that goes over into the next is part of that.
+        self._joined = (cosine >= top) & (self._first * math.pi + self._reach - self._start < LEAST_PASS)
+        self._first += self._joined
         quartic = radial_polynomial(self.rays)
         self._quartic = np.stack(quartic)
         self._function = Weierstrass.of_quartic(*quartic)
         self._u0 = 1.0 / rays.observer.r
         self._highest = 1.0 / (horizon_radius(rays.spin) * HORIZON_MARGIN)
 
-    def passes(self, order: int, inner: float, outer: float) -> tuple[Index, Array, Array]:
-        """Return which of `live` meet the disk in a pass, and the path angles from the camera to its ends, (n,)."""
-        middle = (self._first + order) * math.pi
+    def orders(self, crossings: int) -> range:
+        """Return the numbers of the passes that any ray may make."""
+        if not len(self.live):
+            return range(0)
+        return range(int(self._first.min()), int(np.floor(self._start.max() / math.pi)) + crossings + 1)
+
+    def passes(self, order: int, crossings: int, inner: float, outer: float) -> tuple[Index, Array, Array]:
+        """Return which of `live` meet the disk in a pass, and the path angles from the camera to its ends, (n,).
+
+        `order`: of the pass, that about chi = order pi; neighboring rays have the same. `crossings`: how often rays may
+        cross the plane; what lies before they first do is free.
+        """
+        middle = order * math.pi
         low = np.maximum(self._start, middle - self._reach) - self._start
+        low[self._joined & (order == self._first)] = 0.0
         high = middle + self._reach - self._start
-        every = np.arange(len(self.live))
+        asked = (order >= self._first) & (order <= np.floor(self._start / math.pi) + crossings) & (high > low)
+        chosen = np.flatnonzero(asked)
+        low, high = low[chosen], high[chosen]
+        for led in (LED_AT, LED_AT[:0]):  # the second cut is finer
+            met, low, high = self._cut(chosen, low, high, led, (inner, outer))
+            chosen, low, high = chosen[met], low[met], high[met]
+        return chosen, low, high
+
+    def _cut(
+        self, chosen: Index, low: Array, high: Array, led: Array, radii: tuple[float, float]
+    ) -> tuple[Mask, Array, Array]:
+        """Return which passes meet the disk, and the path angles between which they do."""
+        if not len(chosen):
+            return np.zeros(0, dtype=bool), low, high
         with np.errstate(all="ignore"):
-            angle = np.concatenate([low * LED_AT, low + (high - low) * CULLED_AT]).clip(1e-9)
-            height = self._height * np.cos(angle) + self._rise * np.sin(angle)
-            time = self._times(every, angle, self._speed(every, height))
-            u, _ = self._motion(every).after(*self._function.at(time))
-            gone = self._gone(u)[len(LED_AT) :]
-            u = u[len(LED_AT) :]
-            near = ~gone & (u > 1.0 / (outer * CULLED_BEYOND))
-            met = near.any(axis=0) & ((u < CULLED_BEYOND / inner) | gone).any(axis=0)
-            crosses = (u[:-1] - 1.0 / outer) * (u[1:] - 1.0 / outer) < 0.0
-            met |= (crosses & ~gone[:-1]).any(axis=0)
-        chosen = np.flatnonzero(met & ~gone[0] & (high > low))
-        return chosen, low[chosen], high[chosen]
+            angle = np.concatenate([low * led, low + (high - low) * CULLED_AT]).clip(1e-9)
+            height = self._height * np.cos(angle) + self._rise[chosen] * np.sin(angle)
+            time = self._times(chosen, angle, self._speed(chosen, height))
+            u, _ = self._motion(chosen).after(*self._function.select(chosen).at(time))
+            gone = self._gone(u)[len(led) :]
+            u = u[len(led) :]
+            # How far inside the disk, in u; rays that jump over it are in it where they pass its middle.
+            rims = 1.0 / (radii[1] * CULLED_BEYOND), CULLED_BEYOND / radii[0]
+            inside = np.where(gone, -math.inf, np.minimum(u - rims[0], rims[1] - u))
+        past = u > 0.5 * (rims[0] + rims[1])
+        jumps = (inside[:-1] <= 0.0) & (inside[1:] <= 0.0) & (past[:-1] != past[1:]) & ~gone[:-1]
+        is_in = inside > 0.0
+        is_in[:-1] |= jumps
+        is_in[1:] |= jumps
+        begin, end = _hull(is_in, inside)
+        return is_in.any(axis=0) & ~gone[0], low + begin * (high - low), low + end * (high - low)
 
     def heights(self, chosen: Index, low: Array, high: Array, edges: Array) -> tuple[Samples, Array]:
         """Return what `samples` does without azimuths and delays, and the path angles."""
         middles, widths = 0.5 * (edges[1:] + edges[:-1]), edges[1:] - edges[:-1]
-        angle = low + (high - low) * middles
+        angle = (low + (high - low) * middles).clip(1e-9)
         height = self._height * np.cos(angle) + self._rise[chosen] * np.sin(angle)
         speed = self._speed(chosen, height)
         with np.errstate(all="ignore"):
@@ -137,24 +174,24 @@ class LayerPaths:
             lead = 0.5 * (1.0 + _PLACES) * time[0]
             u, slope = self._motion(chosen).after(*self._function.select(chosen).at(lead))
             weights = 0.5 * time[0] * _WEIGHTS
-            turned = (weights * self._turn(rays, u)).sum(axis=0) + _along(time, self._turn(rays, known.u))
+            turned = (weights * turn_rate(rays, u)).sum(axis=0) + along(time, turn_rate(rays, known.u))
             if timed:
-                delay = (weights * self._late(rays, u, slope)).sum(axis=0)
-                delay = delay + _along(time, self._late(rays, known.u, known.u_slope))
+                delay = (weights * late_rate(rays, u, slope)).sum(axis=0)
+                delay = delay + along(time, late_rate(rays, known.u, known.u_slope))
                 delay += 1.0 / self._u0 - 1.0 / known.u + 2.0 * np.log(known.u / self._u0)
                 delay += time * (a * rays.b - a * a)
-                delay += a * a * (self._lead(chosen, angle[0], 2) + _along(time, height * height))
-        drift = self._drift(chosen, angle[0]) + _along(angle, drift_rate)
+                delay += a * a * (self._lead(chosen, angle[0], 2) + along(time, height * height))
+        drift = self._drift(chosen, angle[0]) + along(angle, drift_rate)
         (x0, y0, _), (xt, yt, _), (xp, yp, _) = self._polar.triad
         along_theta, along_phi = self._polar.tangent_theta[chosen], self._polar.tangent_phi[chosen]
         cos, sin = np.cos(angle), np.sin(angle)
         x = x0 * cos + (xt * along_theta + xp * along_phi) * sin
         y = y0 * cos + (yt * along_theta + yp * along_phi) * sin
-        return replace(known, phi=np.arctan2(y, x) + drift + turned, delay=delay)
+        return replace(known, phi=unwrapped(np.arctan2(y, x)) + drift + turned, delay=delay)
 
     def _times(self, chosen: Index, angle: Array, speed: Array) -> Array:
         """Return Mino times after path angles of shape (nodes, n) that rise; `speed`: s there."""
-        times: Array = self._lead(chosen, angle[0], 0) + _along(angle, 1.0 / speed)
+        times: Array = self._lead(chosen, angle[0], 0) + along(angle, 1.0 / speed)
         return times
 
     def _lead(self, chosen: Index, span: Array, power: int) -> Array:
@@ -182,20 +219,6 @@ class LayerPaths:
         result: Array = total * (a2 * self._polar.b[chosen] / pole)
         return result
 
-    def _turn(self, rays: Rays, u: Array) -> Array:
-        """Return the azimuth's part of the radial motion by Mino time, backward."""
-        a, square = rays.spin, u * u
-        rate: Array = -a * (2.0 * u - a * rays.b * square) / (1.0 - 2.0 * u + a * a * square)
-        return rate
-
-    def _late(self, rays: Rays, u: Array, slope: Array) -> Array:
-        """Return the time's radial part by Mino time, less what is known of it (`travel_time`)."""
-        a, square = rays.spin, u * u
-        spinning = 1.0 + a * a * square
-        rate: Array = spinning * (spinning - a * rays.b * square) / (square * (1.0 - 2.0 * u + a * a * square))
-        rate -= slope * (1.0 + 2.0 * u) / square
-        return rate
-
     def _motion(self, chosen: Index) -> QuarticMotion:
         slope = self.rays.radial[chosen] * self._u0**2
         quartic = self._quartic[:, chosen]
@@ -207,7 +230,46 @@ class LayerPaths:
         return ended
 
 
-def _along(time: Array, rate: Array) -> Array:
+def _hull(met: NDArray[np.bool_], inside: Array) -> tuple[Array, Array]:
+    """Return the shares of passes between which rays are in the disk, (n,); `inside`: > 0 there, linear at its rims."""
+    ends = []
+    for flipped in (False, True):
+        is_in, value, shares = (each[::-1] if flipped else each for each in (met, inside, CULLED_AT[:, 0]))
+        first = is_in.argmax(axis=0)
+        every = np.arange(is_in.shape[1])
+        before = np.maximum(first - 1, 0)
+        out, within = value[before, every], value[first, every]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = within / (within - out) + CUT_MARGIN
+        share = np.where((within > 0.0) & np.isfinite(out), share.clip(0.0, 1.0), 1.0)
+        ends.append(shares[first] + share * (shares[before] - shares[first]))
+    return ends[0], ends[1]
+
+
+def turn_rate(rays: Rays, u: Array) -> Array:
+    """Return the azimuth's part of the radial motion by Mino time, backward."""
+    a, square = rays.spin, u * u
+    rate: Array = -a * (2.0 * u - a * rays.b * square) / (1.0 - 2.0 * u + a * a * square)
+    return rate
+
+
+def late_rate(rays: Rays, u: Array, slope: Array) -> Array:
+    """Return the time's radial part by Mino time, less what is known of it (`travel_time`)."""
+    a, square = rays.spin, u * u
+    spinning = 1.0 + a * a * square
+    rate: Array = spinning * (spinning - a * rays.b * square) / (square * (1.0 - 2.0 * u + a * a * square))
+    rate -= slope * (1.0 + 2.0 * u) / square
+    return rate
+
+
+def unwrapped(angle: Array) -> Array:
+    """Return angles of shape (nodes, n) without jumps by whole turns from node to node."""
+    jumps = np.rint(np.diff(angle, axis=0) * (0.5 / math.pi))
+    angle[1:] -= np.cumsum(jumps, axis=0) * (2.0 * math.pi)
+    return angle
+
+
+def along(time: Array, rate: Array) -> Array:
     """Return the integral of a rate from the first node on, by the trapezoidal rule."""
     steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time, axis=0)
     total: Array = np.concatenate([np.zeros((1, time.shape[1])), np.cumsum(steps, axis=0)])

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion in a quartic potential in closed form, by Weierstrass's elliptic function.
 
-The solution of u'^2 = U(u), U = 1 + c_2 u^2 + c_3 u^3 + c_4 u^4, that starts from u_0 with u_0' is a rational function
-of P(t) and P'(t) (Biermann and Weierstrass; Whittaker & Watson 1927, A Course of Modern Analysis, 20.6):
+The solution of u'^2 = U(u), U = c_0 + c_2 u^2 + c_3 u^3 + c_4 u^4, that starts from u_0 with u_0' is a rational
+function of P(t) and P'(t) (Biermann and Weierstrass; Whittaker & Watson 1927, A Course of Modern Analysis, 20.6):
 
     u - u_0 = [U' q / 2 + U U''' / 24 - u_0' P'] / [2 q^2 - U U'''' / 48],   q = P - U'' / 24,
 
 U and its derivatives taken at u_0. P has the invariants of the quartic,
 
-    g_2 = c_4 + c_2^2 / 12,   g_3 = c_2 c_4 / 6 - c_2^3 / 216 - c_3^2 / 16,
+    g_2 = c_0 c_4 + c_2^2 / 12,   g_3 = c_0 c_2 c_4 / 6 - c_2^3 / 216 - c_0 c_3^2 / 16,
 
 and does not know of turning points, ends or kinds of orbits: one formula, regular through all of them, serves every
 ray. P itself is its Laurent series for short times, doubled as often as needed by its addition theorem (Abramowitz &
@@ -40,12 +40,13 @@ class Weierstrass:
         """What makes a time one without units: half a turn around a hole takes about 0.8 of that."""
 
     @classmethod
-    def of_quartic(cls, c2: Array, c3: Array, c4: Array) -> Weierstrass:
+    def of_quartic(cls, c2: Array, c3: Array, c4: Array, c0: Array | float = 1.0) -> Weierstrass:
         """Return the function that belongs to U."""
         square = c2 * c2
-        half_g2 = 0.5 * c4 + square / 24.0
+        half_g2 = 0.5 * c0 * c4 + square / 24.0
         terms = np.empty((LAST_TERM - 1, len(c2)))
-        terms[0], terms[1] = half_g2 / 10.0, (c2 * (c4 / 6.0 - square / 216.0) - c3 * c3 / 16.0) / 28.0
+        terms[0] = half_g2 / 10.0
+        terms[1] = (c2 * (c0 * c4 / 6.0 - square / 216.0) - c0 * c3 * c3 / 16.0) / 28.0
         for k in range(4, LAST_TERM + 1):
             # sum of c_m c_(k - m), m = 2 .. k - 2
             pairs = (terms[: k - 3] * terms[k - 4 :: -1]).sum(axis=0)

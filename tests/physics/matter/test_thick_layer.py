@@ -35,7 +35,7 @@ def test_samples_at_the_plane_are_the_crossings():
     found, _ = view.crossings(x, y, 3, 1e-9, "gauss-legendre")
     compared = 0
     for order in range(2):
-        chosen, low, high = paths.passes(order, 2.4, 18.0)
+        chosen, low, high = paths.passes(order + 1, 3, 2.4, 18.0)
         samples = paths.samples(chosen, low, high, np.array([[0.0], [0.5 - 1e-9], [0.5 + 1e-9], [1.0]]), True)
         ray = paths.live[chosen]
         on_disk = (found.u[order, ray] > 1.0 / 18.0) & (found.u[order, ray] < 1.0 / 2.4)
