@@ -19,7 +19,7 @@ from ..scene.sky import sky_frames
 from .folder import folder
 
 # Raised whenever the levels of an image, or their file, change.
-VERSION = 1
+VERSION = 2
 
 _DIGITS = 16
 

@@ -52,7 +52,7 @@ from .builder import TreeBuilder
 from .versioned_group import GROUP_NODE_TYPE, SocketSpec, Values, VersionedGroup, setting_socket
 
 GROUP_NAME = "Umbra Black Hole"
-GROUP_VERSION = 7
+GROUP_VERSION = 8
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"

@@ -15,7 +15,7 @@ from ..core.physics_api import physics
 from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_integer, sin, sqrt, where
 from .builder import Float, TreeBuilder, Vector
 from .disk_layer import DiskLight
-from .filtered_sky import filtered
+from .filtered_sky import Sky, filtered
 from .image_lookup import sample_bilinearly
 from .image_nodes import erode, separate_color
 from .redshift import redshift_gain
@@ -112,7 +112,8 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
         environment = sample_bilinearly(inputs.environment, u, v)
     if looks:
         with builder.frame("Filtered sky"):
-            environment = filtered(environment, inputs.levels, inputs.footprint, direction, inputs.rotation, looks)
+            levels = Sky(inputs.environment, inputs.levels, inputs.rotation)
+            environment = filtered(environment, levels, inputs.footprint, direction, looks)
     with builder.frame("Redshift"):
         gain = redshift_gain(
             channels.one_plus_z, inputs.redshift_color, inputs.redshift_brightness, inputs.temperature, environment

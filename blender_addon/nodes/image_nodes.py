@@ -49,7 +49,7 @@ def render_area(builder: TreeBuilder) -> Vector:
     return Vector(builder, (mask * 0.0).socket)
 
 
-def map_uv(image: Vector, uv: Vector, interpolation: str) -> Vector:
+def map_uv(image: Vector, uv: Vector, interpolation: str, ends: str = "Extend") -> Vector:
     """Look an image up at texture coordinates.
 
     Parameters
@@ -59,7 +59,9 @@ def map_uv(image: Vector, uv: Vector, interpolation: str) -> Vector:
     uv : Vector
         Texture coordinates 0 to 1, v from below; the third component must be 1.
     interpolation : {"Nearest", "Bilinear"}
-        "Bilinear" exists in Blender 5.x only: u repeats, v ends at the edges.
+        "Bilinear" exists in Blender 5.x only. u repeats there; in 4.5 all is 0 outside.
+    ends : {"Extend", "Clip"}
+        What lies below and above the picture in Blender 5.x: its first and last row, or 0.
 
     Raises
     ------
@@ -71,7 +73,7 @@ def map_uv(image: Vector, uv: Vector, interpolation: str) -> Vector:
     if COMPOSITOR_SETTINGS_ARE_SOCKETS:
         node.inputs["Interpolation"].default_value = interpolation
         node.inputs["Extension X"].default_value = "Repeat"
-        node.inputs["Extension Y"].default_value = "Extend"
+        node.inputs["Extension Y"].default_value = ends
     else:
         if interpolation != "Nearest":
             raise ValueError(f"Map UV has no {interpolation} interpolation in Blender 4.5.")

@@ -7,9 +7,10 @@ mean light of the part of the celestial sphere that it covers: rows are weighted
 (Heckbert 1989, "Fundamentals of Texture Mapping and Image Warping", on prefiltered look-ups; the weights are those of
 the sphere).
 
-All levels fit into one picture, the atlas: level 0 at the bottom, the others side by side above it, each with
-a margin of `MARGIN` texels that continues it, columns around the sky and rows beyond the poles. Its layout follows from
-its height alone; see `LevelLayout`.
+All levels but level 0, which is the sky's own picture, fit into one picture, the atlas: level 1 at the bottom, the
+others side by side above it, each with a margin of `MARGIN` texels that continues it, columns around the sky and rows
+beyond the poles. Its layout follows from its height alone; see `LevelLayout`. With level 0 in it, it would take four
+times the memory.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ MARGIN = 4
 FEWEST_ROWS = 8
 """The coarsest level has 8 to 15 rows: eight looks of that width see the whole sky."""
 
-MOST_ROWS = 4096
+MOST_ROWS = 8192
 """Rows of level 0 at most; a sky with more is averaged down to as many."""
 
 LARGEST_HALF = 65504.0
@@ -38,12 +39,12 @@ LARGEST_HALF = 65504.0
 
 @dataclass(frozen=True)
 class LevelLayout:
-    """Where the levels of a sky lie in their atlas.
+    """Where levels lie in a picture, the first one at the bottom.
 
     Attributes
     ----------
     rows : int
-        Rows of level 0, m 2^(count - 1) with m from 8 to 15; it has twice as many columns.
+        Rows of the first level, m 2^(count - 1) with m from 8 to 15; it has twice as many columns.
     """
 
     rows: int
@@ -60,7 +61,7 @@ class LevelLayout:
         return max(2 * self.rows + 2 * MARGIN, further), self.rows * 3 // 2 + 4 * MARGIN
 
     def corner(self, level: int) -> tuple[int, int]:
-        """Columns and rows from the atlas's lower left corner to that of a level, without its margin."""
+        """Columns and rows from the lower left corner to that of a level, without its margin; 0 is the first one."""
         if level == 0:
             return MARGIN, MARGIN
         before = sum(2 * self.rows // 2**each + 2 * MARGIN for each in range(1, level))
@@ -94,21 +95,27 @@ class SkyLevels:
 
     @property
     def layout(self) -> LevelLayout:
-        """Where they lie in the atlas."""
+        """How many there are, of how many rows."""
         return LevelLayout(self.levels[0].shape[0])
 
+    @property
+    def atlas_layout(self) -> LevelLayout:
+        """Where levels 1 and further lie in the atlas."""
+        return LevelLayout(self.levels[1].shape[0])
+
     def atlas(self) -> Texels:
-        """Return all levels in one picture, row 0 at the top.
+        """Return all levels but level 0 in one picture, row 0 at the top.
 
         Returns
         -------
         ndarray of float32, shape (height, width, channels)
-            `LevelLayout.size`; black where no level lies.
+            The size of `atlas_layout`; black where no level lies.
         """
-        width, height = self.layout.size
+        layout = self.atlas_layout
+        width, height = layout.size
         picture = np.zeros((height, width, self.levels[0].shape[2]), np.float32)
-        for number, level in enumerate(self.levels):
-            column, row = self.layout.corner(number)
+        for number, level in enumerate(self.levels[1:]):
+            column, row = layout.corner(number)
             around = np.pad(level, ((0, 0), (MARGIN, MARGIN), (0, 0)), mode="wrap")
             around = np.pad(around, ((MARGIN, MARGIN), (0, 0), (0, 0)), mode="edge")
             top, left = height - row - level.shape[0] - MARGIN, column - MARGIN

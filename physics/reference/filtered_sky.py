@@ -48,8 +48,8 @@ def sample_filtered(
         level = floor(log2(max(b, a / K) / s)), from 0 to the coarsest,
         light = mean of level(D + m sqrt(1 - (2^level s / a)^2) ((k + 1/2) / K - 1/2)) over k = 0 ... K - 1,
 
-    each a bilinear look-up. The root takes off the width that the level's own texels add. Where a <= s nothing is
-    averaged: the sky itself is looked up.
+    each a bilinear look-up, on level 0 in the sky's own picture. The root takes off the width that the level's own
+    texels add. Where a <= s nothing is averaged: the sky itself is looked up.
     """
     picture: FloatArray = np.asarray(environment, dtype=np.float64)
     directions = np.asarray(directions, dtype=np.float64)
@@ -66,7 +66,8 @@ def sample_filtered(
     spread = np.sqrt(np.maximum(0.0, 1.0 - (texel * 2.0**level / length) ** 2))
     major = major * spread[:, np.newaxis]
     light = np.zeros((len(length), picture.shape[2]))
-    for number, texels in enumerate(levels.levels):
+    for number, coarser in enumerate(levels.levels):
+        texels = coarser if number else picture
         chosen = level == number
         for look in range(looks):
             place = directions[chosen] + major[chosen] * ((look + 0.5) / looks - 0.5)

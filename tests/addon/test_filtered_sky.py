@@ -105,6 +105,19 @@ def test_magnified_pixels_are_those_without_a_filter(group: GroupRenderer) -> No
     np.testing.assert_array_equal(picture[magnified], plain[magnified])
 
 
+def test_texels_that_are_no_numbers_do_not_spread(group: GroupRenderer) -> None:
+    """One in the corner of the picture, and a few elsewhere: the other pixels do not know of them."""
+    broken = sky().copy()
+    broken[-1, 0] = broken[-1, -1] = broken[0, 0] = np.nan
+    broken[300:302, 700:702, :3] = np.inf
+    whole = sky().copy()
+    whole[~np.isfinite(broken)] = 0.0
+    picture, expected = (filtered(group, 8, ROTATIONS[0], each)[..., :3] for each in (broken, whole))
+    finite = np.isfinite(picture).all(axis=-1)
+    assert 0.99 < finite.mean() <= 1.0
+    assert np.median(np.abs(picture - expected)[finite]) < 1e-6
+
+
 @pytest.mark.parametrize("missing", ["levels", "footprint"])
 def test_without_its_pictures_the_group_does_not_filter(group: GroupRenderer, missing: str) -> None:
     warp_map = beside_the_shadow()
