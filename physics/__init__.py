@@ -68,6 +68,7 @@ from .light.disk_flux import page_thorne_flux
 from .light.disk_flux import peak_flux as peak_disk_flux
 from .light.disk_flux import peak_radius as peak_disk_radius
 from .light.disk_flux import relative_flux as relative_disk_flux
+from .light.glare import GLARES
 from .light.matter_settings import (
     MATTER_PRESET_TABLE,
     MATTER_PRESETS,
@@ -80,8 +81,8 @@ from .light.settings import Choice, Setting
 from .light.sky_levels import FEWEST_ROWS as FEWEST_SKY_ROWS
 from .light.sky_levels import LARGEST_HALF, SkyLevels, sky_levels
 from .light.sky_levels import MARGIN as SKY_LEVEL_MARGIN
+from .light.sky_settings import GLARE, SKY_FILTER, SKY_SETTINGS
 from .light.sky_settings import RENDER_ARGUMENTS as SKY_ARGUMENTS
-from .light.sky_settings import SKY_FILTER, SKY_SETTINGS
 from .light.star_sky import Stars, load_stars, milky_way_sky, star_sky
 from .maps.disk_passes import DiskPasses
 from .maps.exit_map import ExitMap, bake_exit_map, bake_exit_map_steps
@@ -107,6 +108,7 @@ from .matter.world_light import world_light_parameters
 from .numerics.background import Background
 from .numerics.errors import BlackHoleError, Cancelled, ImageFileError, UnstableOrbitWarning, WarpMapError
 from .numerics.work import drain, share_of
+from .reference.glare import add_glare
 from .reference.reference_render import (
     ANGLE_SLACK,
     LARGEST_ONE_PLUS_Z,
@@ -148,6 +150,8 @@ __all__ = [
     "EXIT_MAP_FORMAT",
     "FEWEST_SKY_ROWS",
     "FOOTPRINT_FORMAT",
+    "GLARE",
+    "GLARES",
     "IDENTITY",
     "INVALID_MAP_COLOR",
     "LARGEST_HALF",
@@ -222,6 +226,7 @@ __all__ = [
     "WarpMapParameters",
     "WorldMap",
     "accuracy_steps",
+    "add_glare",
     "bake",
     "bake_exit_map",
     "bake_exit_map_steps",

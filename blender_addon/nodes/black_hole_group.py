@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The compositor node groups "Umbra Black Hole": their sockets and their version.
 
-There is one per number of looks at the sky (`group_of`); they differ in nothing else.
+There is one per number of looks at the sky and kind of glare (`group_of`); they differ in nothing else.
 
 What to link to its inputs
 --------------------------
@@ -56,8 +56,8 @@ GROUP_VERSION = 8
 """Raised whenever the group's sockets or nodes change; `ensure_group` migrates files with another number."""
 
 VERSION_KEY = "umbra_version"
-LOOKS_KEY = "umbra_looks"
-"""Custom property of a group: its number of looks."""
+LOOKS_KEY, GLARE_KEY = "umbra_looks", "umbra_glare"
+"""Custom properties of a group: its number of looks, and its kind of glare."""
 
 RENDER = SocketSpec(
     "Render",
@@ -182,7 +182,7 @@ INPUTS = (
 OUTPUTS = (IMAGE, SKY, SHADOW, REDSHIFT)
 
 
-def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
+def _build(looks: int, glare: int, builder: TreeBuilder, values: Values) -> Values:
     with builder.frame("Disk"):
         disk = disk_layer.disk_light(*(values[each.name] for each in disk_layer.SOCKETS))
     inputs = black_hole_nodes.GroupInputs(
@@ -204,7 +204,7 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
         stars=values[STARS.name],
         star_brightness=values[STAR_BRIGHTNESS.name],
     )
-    results = black_hole_nodes.build(builder, inputs, looks)
+    results = black_hole_nodes.build(builder, inputs, looks, glare)
     return {
         IMAGE.name: results.image,
         SKY.name: results.sky,
@@ -214,17 +214,19 @@ def _build(looks: int, builder: TreeBuilder, values: Values) -> Values:
 
 
 @cache
-def group_of(looks: int) -> VersionedGroup:
-    """Return the kind of group for a number of looks at the sky per pixel; 0 does not filter.
+def group_of(looks: int, glare: int = 0) -> VersionedGroup:
+    """Return the kind of group for a number of looks at the sky per pixel, and for a glare; 0 is without.
 
     The compositor evaluates all nodes of a group, needed or not: hence one group per number.
     """
-    return VersionedGroup(
-        GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, partial(_build, looks), variant=(LOOKS_KEY, looks)
-    )
+    variant = (LOOKS_KEY, looks), (GLARE_KEY, glare)
+    build = partial(_build, looks, glare)
+    return VersionedGroup(GROUP_NAME, GROUP_VERSION, VERSION_KEY, INPUTS, OUTPUTS, build, variant=variant)
 
 
-_KINDS = tuple(group_of(choice.value) for choice in physics.SKY_FILTER.choices)
+_KINDS = tuple(
+    group_of(looks.value, glare.value) for looks in physics.SKY_FILTER.choices for glare in physics.GLARE.choices
+)
 
 
 def kind_of(tree: bpy.types.NodeTree | None) -> VersionedGroup | None:
@@ -241,33 +243,33 @@ def is_current(tree: bpy.types.NodeTree) -> bool:
     """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
     kind = kind_of(tree)
     inner = filtered_sky.LOOK.find()
-    whole = kind == group_of(0) or (inner is not None and filtered_sky.LOOK.is_current(inner))
+    whole = not tree.get(LOOKS_KEY) or (inner is not None and filtered_sky.LOOK.is_current(inner))
     return kind is not None and kind.is_current(tree) and whole
 
 
-def ensure_group(looks: int = 0, tree: bpy.types.NodeTree | None = None) -> bpy.types.NodeTree:
-    """Return the group for a number of looks, and build it and the group inside it if they are not current.
+def ensure_group(looks: int = 0, tree: bpy.types.NodeTree | None = None, glare: int = 0) -> bpy.types.NodeTree:
+    """Return the group for a number of looks and a glare, and build it and the group inside it if they are not current.
 
     A group that is given becomes it; by default it is this file's.
     """
     if looks:
         filtered_sky.LOOK.ensure()
-    return group_of(looks).ensure(tree)
+    return group_of(looks, glare).ensure(tree)
 
 
-def find_group(looks: int = 0) -> bpy.types.NodeTree | None:
-    """Return this file's group for a number of looks, or None."""
-    return group_of(looks).find()
+def find_group(looks: int = 0, glare: int = 0) -> bpy.types.NodeTree | None:
+    """Return this file's group for a number of looks and a glare, or None."""
+    return group_of(looks, glare).find()
 
 
-def add_group_node(tree: bpy.types.NodeTree, looks: int = 0) -> bpy.types.Node:
+def add_group_node(tree: bpy.types.NodeTree, looks: int = 0, glare: int = 0) -> bpy.types.Node:
     """Add a group node to a compositor tree."""
-    ensure_group(looks)
-    return group_of(looks).add_node(tree)
+    ensure_group(looks, glare=glare)
+    return group_of(looks, glare).add_node(tree)
 
 
-def use(node: bpy.types.Node, looks: int) -> None:
-    """Let a group node use the group for a number of looks; what is linked to it and set on it stays.
+def use(node: bpy.types.Node, looks: int, glare: int = 0) -> None:
+    """Let a group node use the group for a number of looks and a glare; what is linked to it and set on it stays.
 
     Parameters
     ----------
@@ -275,17 +277,19 @@ def use(node: bpy.types.Node, looks: int) -> None:
         A group node.
     looks : int
         0 or one of the choices of `physics.SKY_FILTER`.
+    glare : int
+        One of `physics.GLARES`.
     """
     former = node.node_tree
     kind = kind_of(former)
     if former is not None and kind is not None and former.library is None:
-        present = group_of(looks).find()
+        present = group_of(looks, glare).find()
         if former.users == 1 and present in (None, former):
-            ensure_group(looks, former)  # in place: nobody else uses it
+            ensure_group(looks, former, glare)  # in place: nobody else uses it
             remove_unused()
             return
         kind.ensure(former)  # now its inputs are those of the other group
-    group = ensure_group(looks)
+    group = ensure_group(looks, glare=glare)
     if former == group:
         return
     links = node.id_data.links

@@ -16,6 +16,7 @@ from .arithmetic import atan2, clamp, combine, cos, multiply_add, nearest_intege
 from .builder import Float, TreeBuilder, Vector
 from .disk_layer import DiskLight
 from .filtered_sky import Sky, filtered
+from .glare import add_glare
 from .image_lookup import sample_bilinearly
 from .image_nodes import erode, separate_color
 from .redshift import redshift_gain
@@ -86,7 +87,7 @@ class _Angle:
     rest: Float
 
 
-def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs:
+def build(builder: TreeBuilder, inputs: GroupInputs, looks: int, glare: int = 0) -> GroupOutputs:
     """Add all nodes between the group's inputs and its outputs.
 
     Parameters
@@ -97,6 +98,8 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
         That node's values.
     looks : int
         Looks at the sky per pixel, along its footprint; 0: one, unfiltered.
+    glare : int
+        How the light of sky and disk is spread, one of `physics.GLARES`; 0: not at all.
 
     Returns
     -------
@@ -130,7 +133,7 @@ def build(builder: TreeBuilder, inputs: GroupInputs, looks: int) -> GroupOutputs
     with builder.frame("Behind the hole"):
         behind = _behind(inputs)
     with builder.frame("Picture"):
-        return _compose(inputs, sky, data, has_stars, behind)
+        return _compose(inputs, sky, data, has_stars, behind, glare)
 
 
 def _read_map(warp_map: Vector) -> _MapChannels:
@@ -226,19 +229,28 @@ def _behind(inputs: GroupInputs) -> Float:
     return deeper * clamp(inputs.hide_behind, 0.0, 1.0)
 
 
-def _compose(inputs: GroupInputs, sky: Vector, data: Vector, has_stars: Float, behind: Float) -> GroupOutputs:
+def _compose(
+    inputs: GroupInputs, sky: Vector, data: Vector, has_stars: Float, behind: Float, glare: int
+) -> GroupOutputs:
     """Render over disk over sky, premultiplied. Alpha Over would drop light whose alpha is 0, such as flames.
 
     Of what is behind the hole only the share of a pixel is seen that is not shadow. The rest shows the disk; there is
     no sky in it to be covered.
+
+    A glare spreads what is seen of sky and disk, over the render too, as a lens does. It leaves the render's own light,
+    which the artist's glare behind this group may spread.
     """
     visibility, one_plus_z, valid = data.separate()
     valid = valid * inputs.disk.there * has_stars
     sky = multiply_add(sky, 1.0 - inputs.disk.covers, inputs.disk.light)
     _, _, _, alpha = separate_color(inputs.render)
     hidden = ((1.0 - visibility) * behind).labeled("Hidden")
-    image = multiply_add(sky, 1.0 - alpha, inputs.render * (1.0 - hidden))
-    image = multiply_add(inputs.disk.light, alpha * hidden, image)
+    if glare:
+        seen = multiply_add(inputs.disk.light, alpha * hidden, sky * (1.0 - alpha)).labeled("Sky and disk")
+        image = multiply_add(inputs.render, 1.0 - hidden, add_glare(seen, glare))
+    else:
+        image = multiply_add(sky, 1.0 - alpha, inputs.render * (1.0 - hidden))
+        image = multiply_add(inputs.disk.light, alpha * hidden, image)
     return GroupOutputs(
         image=where(valid, image, physics.INVALID_MAP_COLOR).labeled("Magenta if invalid"),
         sky=sky,

@@ -254,6 +254,10 @@ class Vector(Value):
         """The larger of each two components."""
         return self._apply("MAXIMUM", other)
 
+    def at_most(self, other: Direction) -> Vector:
+        """The smaller of each two components."""
+        return self._apply("MINIMUM", other)
+
     def cross(self, other: Direction) -> Vector:
         """Cross product."""
         return self._apply("CROSS_PRODUCT", other)

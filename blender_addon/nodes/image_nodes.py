@@ -127,6 +127,22 @@ def erode(image: Float, pixels: int) -> Float:
     return Float(image.builder, node.outputs[0])
 
 
+def blur(image: Vector, across: Float, down: Float) -> Vector:
+    """Blur an image by a Gaussian of a size in pixels, three times its standard deviation, along rows and columns.
+
+    Beyond its edges the image goes on as it is there. Wide blurs take no longer than narrow ones, and undershoot.
+    """
+    size = image.builder.combine(across, down, 0.0)
+    node = image.builder.node("CompositorNodeBlur")
+    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
+        node.inputs["Type"].default_value = "Fast Gaussian"
+    else:
+        node.filter_type = "FAST_GAUSS"
+    image.builder.feed(node.inputs["Image"], image)
+    image.builder.feed(node.inputs["Size"], size)
+    return Vector(image.builder, node.outputs[0])
+
+
 def _resampling_node(image: Vector, kind: str, interpolation: str) -> bpy.types.Node:
     node = image.builder.node(kind)
     image.builder.feed(node.inputs["Image"], image)

@@ -76,14 +76,14 @@ class VersionedGroup:
     """Adds all nodes between the group's inputs and its outputs, given and returned by socket name."""
     tree_type: str = TREE_TYPE
     node_type: str = GROUP_NODE_TYPE
-    variant: tuple[str, int] | None = None
-    """A further custom property and its value, where several kinds have the same `version_key`; none counts as 0."""
+    variant: tuple[tuple[str, int], ...] = ()
+    """Further custom properties and their values, where several kinds have the same `version_key`; none counts as 0."""
 
     def owns(self, tree: bpy.types.NodeTree | None) -> bool:
         """Whether a node tree is of this kind, whatever its version and state."""
         if tree is None or tree.bl_idname != self.tree_type or self.version_key not in tree:
             return False
-        return self.variant is None or tree.get(self.variant[0], 0) == self.variant[1]
+        return all(tree.get(key, 0) == value for key, value in self.variant)
 
     def is_current(self, tree: bpy.types.NodeTree) -> bool:
         """Whether a group is of this version, built by this version of Blender, and unchanged inside."""
@@ -140,8 +140,8 @@ class VersionedGroup:
             builder.feed(targets[spec.name], results[spec.name])
         builder.arrange()
         tree[self.version_key] = self.version
-        if self.variant is not None:
-            tree[self.variant[0]] = self.variant[1]
+        for key, value in self.variant:
+            tree[key] = value
         tree[BLENDER_KEY] = SERIES
         tree[CONTENT_KEY] = _fingerprint(tree)
 

@@ -265,6 +265,9 @@ for _name in SKY_PROPERTIES:
 UmbraSceneProperties.__annotations__["sky_filter"] = property_of(
     physics.SKY_FILTER, lambda settings, _context: _refresh(settings)
 )
+UmbraSceneProperties.__annotations__["glare"] = property_of(
+    physics.GLARE, lambda settings, _context: _refresh(settings)
+)
 saved_names.accept(UmbraSceneProperties, saved_names.SCENE)
 
 
@@ -283,6 +286,11 @@ def _preview_changed(settings: UmbraSceneProperties) -> None:
 def looks_of(settings: SceneSettings) -> int:
     """The number of looks at the sky per pixel, from the chosen filter; 0 where it is not filtered."""
     return int(next(each.value for each in physics.SKY_FILTER.choices if each.identifier == settings.sky_filter))
+
+
+def glare_of(settings: SceneSettings) -> int:
+    """The kind of glare that is chosen, one of `physics.GLARES`; 0 where there is none."""
+    return int(next(each.value for each in physics.GLARE.choices if each.identifier == settings.glare))
 
 
 def tolerances_of(settings: SceneSettings) -> tuple[float, float]:

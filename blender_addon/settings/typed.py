@@ -62,6 +62,7 @@ class SceneSettings(_Group):
     redshift_brightness: float
     sky_temperature: float
     sky_filter: str
+    glare: str
     live_preview: bool
     foreground: bpy.types.Collection | None
     foreground_scene: bpy.types.Scene | None

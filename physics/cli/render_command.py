@@ -18,8 +18,9 @@ from ..images.exr import replacing, write_exr
 from ..images.picture import read_picture
 from ..images.png import write_png
 from ..light.color import redshift_gain
-from ..light.sky_settings import RENDER_ARGUMENTS, SKY_FILTER, SKY_SETTINGS
+from ..light.sky_settings import GLARE, RENDER_ARGUMENTS, SKY_FILTER, SKY_SETTINGS
 from ..numerics.errors import BlackHoleError
+from ..reference.glare import add_glare
 from ..reference.reference_render import over_sky, render
 from . import disk_options, star_options
 from .console import note, say
@@ -53,6 +54,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=[each.identifier.lower() for each in SKY_FILTER.choices],
         default=SKY_FILTER.identifier(int(SKY_FILTER.default)).lower(),
         help=SKY_FILTER.description,
+    )
+    parser.add_argument(
+        GLARE.option,
+        choices=[each.identifier.lower() for each in GLARE.choices],
+        default=GLARE.identifier(int(GLARE.default)).lower(),
+        help=GLARE.description,
     )
     star_options.add_render_options(parser)
     parser.add_argument("--light", action="store_true", help="draw the disk: its light that was baked beside the map")
@@ -105,6 +112,8 @@ def run(options: argparse.Namespace) -> None:
     image = star_options.add_stars(options, warp_map, picture.image) if options.stars else picture.image
     if layer is not None:
         image = over_sky(image, layer.light, layer.transmittance)
+    glare = next(int(each.value) for each in GLARE.choices if each.identifier == options.glare.upper())
+    image = add_glare(image, glare)
     with replacing(options.output) as temporary:
         if options.output.suffix.lower() == ".png":
             write_png(temporary, image)

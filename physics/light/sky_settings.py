@@ -7,6 +7,7 @@ table in the manual (`docs/settings_tables.py`) are made from it.
 
 from __future__ import annotations
 
+from . import glare
 from .color import DEFAULT_TEMPERATURE
 from .settings import Choice, Setting
 
@@ -78,3 +79,16 @@ SKY_FILTER = Setting(
     ),
 )
 """The values are numbers of looks; see `reference.filtered_sky`."""
+
+GLARE = Setting(
+    "Glare",
+    "How the lens spreads a share of the light of sky and disk around it, without adding any",
+    glare.OFF,
+    option="--glare",
+    choices=(
+        Choice(glare.OFF, "OFF", 0, "Off", "Light stays where it is", 0.0),
+        Choice(glare.SUBTLE, "SUBTLE", 1, "Subtle", "A clean lens: bright stars have a faint glow", 1.0),
+        Choice(glare.FILM, "FILM", 2, "Film", "An old lens: a wide glow, and spikes to four sides", 2.0),
+    ),
+)
+"""The values are kinds of `glare.GLARES`."""

@@ -32,6 +32,7 @@ def shrink(scene: bpy.types.Scene, size: tuple[int, int] = SIZE) -> None:
     render.image_settings.color_mode = "RGBA"
     render.image_settings.color_depth = "32"
     scene.umbra.sky_filter = "OFF"  # its files and nodes have tests of their own
+    scene.umbra.glare = "OFF"  # and so has this
 
 
 def environment_pixels(height: int = 16) -> np.ndarray:

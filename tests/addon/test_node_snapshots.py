@@ -21,7 +21,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "node_groups"
 RENEW = "UMBRA_RENEW_SNAPSHOTS"
 BLENDER = f"blender{bpy.app.version[0]}"
-GROUPS = ("black_hole", "black_hole_filtered", "disk_layer", "world", "world_tint")
+GROUPS = ("black_hole", "black_hole_filtered", "black_hole_film", "disk_layer", "world", "world_tint")
 ALIKE = ("world", "world_tint")  # the same nodes in each version of Blender
 UNBOUNDED = 1e30
 
@@ -36,6 +36,7 @@ def build(addon_module: Callable[[str], ModuleType]) -> Callable[[str], bpy.type
     builders = {
         "black_hole": black_hole.ensure_group,
         "black_hole_filtered": lambda: black_hole.ensure_group(8),
+        "black_hole_film": lambda: black_hole.ensure_group(glare=2),
         "disk_layer": addon_module("nodes.disk_layer").GROUP.ensure,
         "world": world.new_group,
         "world_tint": addon_module("nodes.world_tint").GROUP.ensure,

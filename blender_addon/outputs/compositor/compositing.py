@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...nodes import black_hole_group
-from ...settings.scene_properties import looks_of
+from ...settings.scene_properties import glare_of, looks_of
 from ..shared import disk_sync
 from ..shared.compositor_tree import (
     GROUP,
@@ -106,7 +106,7 @@ def set_up(scene: bpy.types.Scene) -> list[str]:
         group = tree.nodes.new("CompositorNodeGroup")
         group[ROLE] = GROUP
         group.width = 220
-    black_hole_group.use(group, looks_of(scene.umbra))
+    black_hole_group.use(group, looks_of(scene.umbra), glare_of(scene.umbra))
     group.name = group.label = black_hole_group.GROUP_NAME
     _insert(scene, tree, group, notes)
     refresh(scene, notes)

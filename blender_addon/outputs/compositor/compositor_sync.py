@@ -14,7 +14,7 @@ from ...nodes import black_hole_group
 from ...scene import cameras, frame_setup
 from ...scene.sky import environment, sky_frames
 from ...scene.sky.node_paths import Place
-from ...settings.scene_properties import looks_of
+from ...settings.scene_properties import glare_of, looks_of
 from ..shared import disk_light, disk_sync
 from ..shared.compositor_tree import FOOTPRINT, STARS, Setup, find_node, find_setup, find_tree, takes_sky_from_settings
 from ..shared.map_images import NO_MAP, file_image, plain_layer, plain_map, read_sequence
@@ -37,14 +37,14 @@ def repair(scene: bpy.types.Scene, *, thorough: bool = True) -> bool:
     inputs, outputs = setup.group.inputs, setup.group.outputs
     whole = all(spec.name in inputs for spec in black_hole_group.INPUTS)
     whole = whole and all(spec.name in outputs for spec in black_hole_group.OUTPUTS)
-    looks = looks_of(scene.umbra)
-    if black_hole_group.kind_of(tree) != black_hole_group.group_of(looks):
+    looks, glare = looks_of(scene.umbra), glare_of(scene.umbra)
+    if black_hole_group.kind_of(tree) != black_hole_group.group_of(looks, glare):
         whole = False
     elif whole and thorough and tree is not None:
         whole = black_hole_group.is_current(tree)
     if whole:
         return False
-    black_hole_group.use(setup.group, looks)
+    black_hole_group.use(setup.group, looks, glare)
     return True
 
 

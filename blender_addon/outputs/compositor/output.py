@@ -171,7 +171,9 @@ class CompositorOutput(Output):
         return notes + _alpha_note(scene)
 
     def brighten_stars(self, scene: bpy.types.Scene) -> None:
-        """Brighten the star sky, unless the artist has set an exposure."""
+        """Brighten the star sky, and let it glow, unless the artist has chosen otherwise."""
+        if not scene.umbra.is_property_set("glare"):
+            scene.umbra.glare = "SUBTLE"
         setup = find_setup(scene)
         exposure = None if setup is None else setup.group.inputs.get("Exposure")
         if exposure is not None and exposure.default_value == 0.0:

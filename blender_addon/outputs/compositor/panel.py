@@ -27,6 +27,7 @@ def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene, problem: str | None
     if problem is not None:
         draw_problem(layout, problem)
     layout.prop(settings, "sky_filter", text="Filter")
+    layout.prop(settings, "glare")
     layout.use_property_split = False  # the names are too long to stand beside their fields
     column = layout.column()
     column.active = settings.environment_source == "IMAGE"
