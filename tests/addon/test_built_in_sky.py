@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The built-in sky: a file beside the maps, found wherever those are found."""
 
+import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -165,6 +166,49 @@ def test_a_folder_that_cannot_be_written_to_is_refused(
     add_hole(scene, sky=False)
     assert place_of(scene) == tmp_path / "maps" / star_sky.FILE
     assert tuple(sky_of(scene).size) == (2 * HEIGHT, HEIGHT)
+
+
+def test_space_is_black_and_stars_shine(star_sky: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an artist sees of the whole sky, with all settings as a new hole has them, in both view transforms."""
+    monkeypatch.setattr(star_sky, "HEIGHT", 1024)
+    monkeypatch.setattr(star_sky, "FILE", "umbra_stars_1024.exr")
+    scene = bpy.context.scene
+    shrink(scene, (480, 240))
+    scene.umbra.map_folder = str(tmp_path / "maps")
+    for name in ("sky_filter", "glare"):
+        scene.umbra.property_unset(name)
+    camera = scene.camera
+    camera.data.type = "PANO"
+    (camera.data if hasattr(camera.data, "panorama_type") else camera.data.cycles).panorama_type = "EQUIRECTANGULAR"
+    camera.matrix_world.identity()
+    camera.rotation_euler = (math.pi / 2.0, 0.0, -math.pi / 2.0)
+    hole = add_hole(scene, sky=False, mass_scale=1e-3, motion="STATIC")
+    hole.location = (0.0, 0.0, 30.0)
+    columns, rows = np.meshgrid(np.arange(480) + 0.5, np.arange(240) + 0.5)
+    ascension, declination = np.pi * (1.0 - columns / 240.0), np.pi * (0.5 - rows / 240.0)
+    pole = math.radians(192.85948), math.radians(27.12825)  # of the Galaxy, J2000
+    latitude = np.sin(declination) * math.sin(pole[1])
+    latitude += np.cos(declination) * math.cos(pole[1]) * np.cos(ascension - pole[0])
+    latitude = np.degrees(np.arcsin(latitude))
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "8"
+    if scene.world.cycles.sampling_method == "AUTOMATIC":
+        scene.world.cycles.sampling_method = "NONE"
+    for transform in ("AgX", "Standard"):
+        scene.view_settings.view_transform = transform
+        scene.render.filepath = str(tmp_path / f"{transform}.png")
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(scene.render.filepath)
+        levels = np.empty((240, 480, 4), np.float32)
+        image.pixels.foreach_get(levels.ravel())
+        levels = levels[::-1, :, :3] * 255.0
+        away = (np.abs(latitude) > 30.0) & (np.abs(declination) < 1.3)
+        band = (np.abs(latitude) < 5.0) & (np.abs(declination) < 1.3)
+        assert np.median(levels[away]) <= 12.0, transform
+        assert np.median(levels[band]) > 2.0 * np.median(levels[away]), transform
+        bright = levels[away].max(axis=-1)  # a pixel of 0.75 degrees averages its stars
+        assert bright.max() > 200.0, transform
+        assert (bright > 100.0).sum() > 100, transform
 
 
 def test_a_sky_that_is_packed_stays_packed(star_sky: ModuleType, tmp_path: Path) -> None:
