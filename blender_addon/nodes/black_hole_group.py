@@ -214,7 +214,7 @@ def _build(looks: int, glare: int, builder: TreeBuilder, values: Values) -> Valu
 
 
 @cache
-def group_of(looks: int, glare: int = 0) -> VersionedGroup:
+def group_of(looks: int, glare: int) -> VersionedGroup:
     """Return the kind of group for a number of looks at the sky per pixel, and for a glare; 0 is without.
 
     The compositor evaluates all nodes of a group, needed or not: hence one group per number.

@@ -19,12 +19,15 @@ from .image_nodes import combine_color, separate_color
 from .render_size import stretched_to_render
 from .versioned_group import SocketSpec, Values, VersionedGroup
 
+NOTHING = (0.0, 0.0, 0.0, 1.0)
+"""A layer in which there is nothing: all of what is behind passes."""
+
 DISK = SocketSpec(
     "Disk",
     "NodeSocketColor",
     "The baked light of the disk (Non-Color), premultiplied; alpha is the share of what is behind that passes. Magenta "
     "in the picture means that it is missing",
-    default=(0.0, 0.0, 0.0, 1.0),
+    default=NOTHING,
     hide_value=True,
 )
 EXPOSURE = SocketSpec(

@@ -65,7 +65,7 @@ def test_an_orbits_frames_share_one_trace(
     assert len(maps_in(tmp_path)) == 3
     assert traced == 1
 
-    shot = addon_module("scene.frame_setup").read_at(scene, 3)
+    shot = addon_module("outputs.frames").read_at(scene, 3)
     baked = package.read_warp_map(find_map(tmp_path / "maps", "Scene_Black_Hole_64x36_0003.exr"))
     assert baked.metadata["hash"] == shot.parameters.hash
     expected = package.bake(shot.parameters)

@@ -16,13 +16,16 @@ def refresh(scene: bpy.types.Scene) -> None:
     setup = find_setup(scene)
     if setup is None or setup.tree.library is not None:
         return
+    socket = setup.group.inputs[disk_layer.DISK.name]
+    if not socket.is_linked:  # in files of version 0.1 it is 0, which would be a layer that is missing
+        socket.default_value = disk_layer.NOTHING
     hole = disk_sync.wanted_hole(scene)
     if hole is None:
         disk_sync.remove(setup.tree)
         return
     if disk_sync.has_former(setup.tree):
         disk_sync.remove(setup.tree)
-    disk_sync.ensure_layer(setup.tree, setup.group.inputs[disk_layer.DISK.name])
+    disk_sync.ensure_layer(setup.tree, socket)
     disk_sync.follow(setup.group, hole)
     # A node that got its image only while Blender renders would show it a frame late.
     path = sequence_path(scene, hole.name, cameras.render_size(scene.render), LIGHT_LAYER)

@@ -183,7 +183,7 @@ class CompositorOutput(Output):
         """Bring a node group of an older version up to date; its sky is not filtered, and its stars are no points."""
         setup = find_setup(scene)
         if setup is not None and setup.tree.library is None:
-            is_plain = black_hole_group.kind_of(setup.group.node_tree) == black_hole_group.group_of(0)
+            is_plain = black_hole_group.kind_of(setup.group.node_tree) == black_hole_group.group_of(0, 0)
             has_no_points = stars.SOCKET not in setup.group.inputs  # now: what is set below rebuilds the group
             if is_plain and not scene.umbra.is_property_set("sky_filter"):
                 scene.umbra.sky_filter = "OFF"
