@@ -25,7 +25,7 @@ from ..kerr.metric import horizon_radius
 from ..kerr.rays import Rays
 from ..numerics.arrays import Array, Index, Mask
 from ..numerics.weierstrass import QuarticMotion, Weierstrass
-from .thick_paths import HORIZON_MARGIN, LEAST_BASE, Samples, along, late_rate, turn_rate, unwrapped
+from .thick_paths import CULLED_BEYOND, HORIZON_MARGIN, LEAST_BASE, Samples, along, late_rate, turn_rate, unwrapped
 
 LEAD_NODES = 12
 """Nodes of Gauss and Legendre's rule from the camera to the layer."""
@@ -89,7 +89,7 @@ class SlowPaths:
         def met(index: Index, time: Array) -> tuple[Mask, Mask, Array]:
             """Return where rays are in the layer, where they are on the disk alone, and cos theta."""
             u, _, height = self._places(index, np.maximum(time, LEAST_TIME))
-            on_disk = (u > 1.0 / outer) & (u < 1.0 / inner)
+            on_disk = (u > 1.0 / (outer * CULLED_BEYOND)) & (u < CULLED_BEYOND / inner)
             return on_disk & (np.abs(height) <= self._cosine), on_disk, height
 
         for _ in range(2):

@@ -27,8 +27,8 @@ LEAD_NODES = 12
 """Nodes of Gauss and Legendre's rule from the camera to the layer."""
 _PLACES, _WEIGHTS = (each[:, None] for each in leggauss(LEAD_NODES))
 
-CULLED_AT = np.linspace(0.0, 1.0, 13)[:, None]
-LED_AT = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
+CULLED_AT = np.linspace(0.0, 1.0, 9)[:, None]
+LED_AT = np.linspace(0.0, 1.0, 5, endpoint=False)[:, None]
 """Shares of the way to a pass at which a ray may have ended before."""
 CULLED_BEYOND = 1.05
 """Passes are left out whose radius at these shares of them stays outside the disk by this factor, and cut there."""
@@ -110,13 +110,13 @@ class LayerPaths:
         asked = (order >= self._first) & (order <= np.floor(self._start / math.pi) + crossings) & (high > low)
         chosen = np.flatnonzero(asked)
         low, high = low[chosen], high[chosen]
-        for led in (LED_AT, LED_AT[:0]):  # the second cut is finer
-            met, low, high = self._cut(chosen, low, high, led, (inner, outer))
+        for led, margin in ((LED_AT, CUT_MARGIN), (LED_AT[:0], 0.0)):  # the second cut is finer
+            met, low, high = self._cut(chosen, low, high, led, margin, (inner, outer))
             chosen, low, high = chosen[met], low[met], high[met]
         return chosen, low, high
 
     def _cut(
-        self, chosen: Index, low: Array, high: Array, led: Array, radii: tuple[float, float]
+        self, chosen: Index, low: Array, high: Array, led: Array, margin: float, radii: tuple[float, float]
     ) -> tuple[Mask, Array, Array]:
         """Return which passes meet the disk, and the path angles between which they do."""
         if not len(chosen):
@@ -125,19 +125,20 @@ class LayerPaths:
             angle = np.concatenate([low * led, low + (high - low) * CULLED_AT]).clip(1e-9)
             height = self._height * np.cos(angle) + self._rise[chosen] * np.sin(angle)
             time = self._times(chosen, angle, self._speed(chosen, height))
-            u, _ = self._motion(chosen).after(*self._function.select(chosen).at(time))
+            u, slope = self._motion(chosen).after(*self._function.select(chosen).at(time))
             gone = self._gone(u)[len(led) :]
-            u = u[len(led) :]
-            # How far inside the disk, in u; rays that jump over it are in it where they pass its middle.
+            u, slope = u[len(led) :], slope[len(led) :]
+            # Rays that jump over the disk meet it where they pass its middle.
             rims = 1.0 / (radii[1] * CULLED_BEYOND), CULLED_BEYOND / radii[0]
-            inside = np.where(gone, -math.inf, np.minimum(u - rims[0], rims[1] - u))
+            inside = ~gone & (u > rims[0]) & (u < rims[1])
         past = u > 0.5 * (rims[0] + rims[1])
-        jumps = (inside[:-1] <= 0.0) & (inside[1:] <= 0.0) & (past[:-1] != past[1:]) & ~gone[:-1]
-        is_in = inside > 0.0
-        is_in[:-1] |= jumps
-        is_in[1:] |= jumps
-        begin, end = _hull(is_in, inside)
-        return is_in.any(axis=0) & ~gone[0], low + begin * (high - low), low + end * (high - low)
+        past[1:] = np.where(gone[1:], slope[:-1] > 0.0, past[1:])
+        jumps = ~inside[:-1] & ~inside[1:] & (past[:-1] != past[1:]) & ~gone[:-1]
+        met = inside.copy()
+        met[:-1] |= jumps
+        met[1:] |= jumps
+        begin, end = _hull(met, inside, np.where(gone, np.nan, u), rims, margin)
+        return met.any(axis=0) & ~gone[0], low + begin * (high - low), low + end * (high - low)
 
     def heights(self, chosen: Index, low: Array, high: Array, edges: Array) -> tuple[Samples, Array]:
         """Return what `samples` does without azimuths and delays, and the path angles."""
@@ -230,18 +231,22 @@ class LayerPaths:
         return ended
 
 
-def _hull(met: NDArray[np.bool_], inside: Array) -> tuple[Array, Array]:
-    """Return the shares of passes between which rays are in the disk, (n,); `inside`: > 0 there, linear at its rims."""
+def _hull(met: Mask, inside: Mask, u: Array, rims: tuple[float, float], margin: float) -> tuple[Array, Array]:
+    """Return the shares of passes between which rays are in the disk, (n,), u being nearly linear at its rims.
+
+    `met`, `inside`: whether rays meet the disk about these shares, and whether they are in it; `u`: NaN at their end;
+    `margin`: in steps.
+    """
     ends = []
+    every = np.arange(met.shape[1])
     for flipped in (False, True):
-        is_in, value, shares = (each[::-1] if flipped else each for each in (met, inside, CULLED_AT[:, 0]))
-        first = is_in.argmax(axis=0)
-        every = np.arange(is_in.shape[1])
+        is_met, is_in, place, shares = (each[::-1] if flipped else each for each in (met, inside, u, CULLED_AT[:, 0]))
+        first = is_met.argmax(axis=0)
         before = np.maximum(first - 1, 0)
-        out, within = value[before, every], value[first, every]
+        out, within = place[before, every], place[first, every]
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = within / (within - out) + CUT_MARGIN
-        share = np.where((within > 0.0) & np.isfinite(out), share.clip(0.0, 1.0), 1.0)
+            share = (within - np.where(out < rims[0], *rims)) / (within - out) + margin
+        share = np.where(is_in[first, every] & np.isfinite(share), share.clip(0.0, 1.0), 1.0)
         ends.append(shares[first] + share * (shares[before] - shares[first]))
     return ends[0], ends[1]
 
