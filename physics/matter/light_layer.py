@@ -29,7 +29,7 @@ from .surface import Surface
 from .thick_layer import thick_layer_steps
 from .thin_layer import thin_layer
 
-LAYER_VERSION = 3
+LAYER_VERSION = 4
 """Raised whenever the same parameters and look would give other light."""
 
 LEAST_TRANSMITTANCE = 1e-6

@@ -30,7 +30,7 @@ WIDENED = 2.0
 VISIBLE_PASS = 0.03
 """Passes that take less than this of the light behind do not matter."""
 
-PIXEL_SHARE, LEAST_ERROR = 0.3, (0.004, 0.01, 0.03, 0.03)
+PIXEL_SHARE, LEAST_ERROR = 0.25, (0.003, 0.008, 0.02, 0.02)
 """What interpolation may leave out of ln r, azimuth, ln g and z / H: this share of the change from pixel to pixel, and
 so much in any case."""
 

@@ -29,7 +29,7 @@ BLOCK = 1 << 13
 DENSITY_SHARE = 0.4
 """Power of the turbulence by which the gas is denser; by the rest of it, it is higher."""
 
-SHEAR = 0.15, 0.5
+SHEAR = 1.5, 3.0
 """How far the pattern leans in ln r and azimuth per z / r, so that it is no curtain."""
 
 GROUP = 4
