@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from ..core.physics_api import physics
 from .arithmetic import multiply_add, where
 from .builder import Float, TreeBuilder, Vector
@@ -52,6 +53,9 @@ SOCKETS = (DISK, EXPOSURE, TINT, OPACITY)
 
 BEHIND, IMAGE = "Behind", "Image"
 
+# Stretched bilinearly, Blender 4.5 mixes black into the outermost pixels.
+_STRETCHED = "Bilinear" if COMPOSITOR_SETTINGS_ARE_SOCKETS else "Nearest"
+
 
 @dataclass(frozen=True)
 class DiskLight:
@@ -68,7 +72,7 @@ class DiskLight:
 def disk_light(disk: Vector, exposure: Float, tint: Vector, opacity: Float) -> DiskLight:
     """Return what the values of `SOCKETS` give."""
     # Layers that previews make are smaller than the render.
-    light, passes = stretched_to_render(disk.builder, disk, "Bilinear")
+    light, passes = stretched_to_render(disk.builder, disk, _STRETCHED)
     light = light * tint * (2.0**exposure * opacity)
     return DiskLight(light, (1.0 - passes) * opacity, passes.greater_than(0.0).labeled("Is there a layer?"))
 
