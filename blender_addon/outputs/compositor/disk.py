@@ -17,7 +17,7 @@ def refresh(scene: bpy.types.Scene) -> None:
     if setup is None or setup.tree.library is not None:
         return
     socket = setup.group.inputs[disk_layer.DISK.name]
-    if not socket.is_linked:  # in files of version 0.1 it is 0, which would be a layer that is missing
+    if socket.type == "RGBA" and not socket.is_linked:  # in old files it is 0, which would be a missing layer
         socket.default_value = disk_layer.NOTHING
     hole = disk_sync.wanted_hole(scene)
     if hole is None:
