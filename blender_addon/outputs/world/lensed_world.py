@@ -17,14 +17,12 @@ from ...nodes import world_disk, world_group, world_nodes
 from ...scene.sky import environment, image_world
 from ...scene.sky.node_paths import SHINING
 from . import tinting
+from .world_images import DISKS, MAPS
 
 # On the scene: the World to put back; and that there is one to put back, which may have been none.
 BEFORE, IS_BENT = environment.WORLD_BEFORE, "umbra_world_bent"
-# On the lensed World: what it was made of, the image that reads its maps, and those that the preview's map is kept in.
-LENSED, FILE_IMAGE = "umbra_lensed", "umbra_world_map"
-LIVE_IMAGES = ("umbra_live_map_1", "umbra_live_map_2")
-# The same of the disk's layers of light.
-DISK_IMAGE, LIVE_DISK_IMAGES = "umbra_world_disk", ("umbra_live_disk_1", "umbra_live_disk_2")
+# On the lensed World: what it was made of.
+LENSED = "umbra_lensed"
 OF_IMAGE, OF_WORLD = "image", "world"
 
 # Resolution of the map by which Cycles samples the World's light. Its own choice here is one that takes 12 seconds a
@@ -164,11 +162,7 @@ def forget(scene: bpy.types.Scene) -> None:
 def _delete(world: bpy.types.World) -> None:
     node = group_node(world)
     group = None if node is None else node.node_tree
-    images = {
-        image
-        for image in map(world.get, (FILE_IMAGE, *LIVE_IMAGES, DISK_IMAGE, *LIVE_DISK_IMAGES))
-        if image is not None
-    }
+    images = {image for image in map(world.get, (*MAPS.keys, *DISKS.keys)) if image is not None}
     disks = [
         each.node_tree for each in world.node_tree.nodes if each.type == "GROUP" and world_disk.is_group(each.node_tree)
     ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ...bake.folder import folder
 from ...bake.kinds import WORLD_LIGHT
@@ -22,12 +21,9 @@ from ...scene import frame_setup
 from ...scene.frame_setup import FrameSetup
 from ...scene.sky.node_paths import world_output
 from ..shared import disk_sync
-from ..shared.map_images import NO_MAP, SEQUENCE_SETTINGS, keep_as_data, map_image
-from . import lensed_world
-from .lensed_world import DISK_IMAGE as FILE_IMAGE
-from .lensed_world import LIVE_DISK_IMAGES as LIVE_IMAGES
-
-IMAGE_NAME, LIVE_NAME = "Umbra World Disk", "Umbra Live Disk"
+from ..shared.map_images import NO_MAP, pixels_of
+from . import lensed_world, world_images
+from .world_images import DISKS
 
 # On nodes of a World: that they are the disk's.
 _OURS = "umbra_world_disk_node"
@@ -98,21 +94,10 @@ def _take_out(world: bpy.types.World) -> None:
     for node in ours:
         disk_sync.remove_drivers(tree, node.path_from_id() + ".")
         tree.nodes.remove(node)
-    remove_data(world, groups)
-
-
-def remove_data(world: bpy.types.World, groups: list[bpy.types.NodeTree]) -> None:
-    """Remove groups and images of a World's disk that nothing uses any more."""
-    images = {world[key] for key in (FILE_IMAGE, *LIVE_IMAGES) if world.get(key) is not None}
-    for key in (FILE_IMAGE, *LIVE_IMAGES):
-        if key in world:
-            del world[key]
     for group in groups:
         if group.users == 0:
             bpy.data.node_groups.remove(group)
-    for image in images:
-        if image.users == 0:
-            bpy.data.images.remove(image)
+    DISKS.drop(world)
 
 
 # --- layers ---------------------------------------------------------------------------------------
@@ -140,45 +125,22 @@ def point_at_nothing(scene: bpy.types.Scene) -> None:
 def forget_loaded_layer(scene: bpy.types.Scene) -> None:
     """Let Blender read the layers anew from their files."""
     world = lensed_world.lensed_world(scene)
-    image = None if world is None else world.get(FILE_IMAGE)
+    image = None if world is None else world.get(DISKS.file_key)
     if image is not None:
         image.reload()
 
 
 def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
     world = lensed_world.lensed_world(scene)
-    if world is None or node_of(world) is None:
-        return
-    image = _own(world, FILE_IMAGE)
-    if image is None:
-        image = map_image(IMAGE_NAME)
-        world[FILE_IMAGE] = image
-    keep_as_data(image, is_light=True)
-    if image.filepath != path:
-        image.filepath = path
-    _point(world, image, physics.WORLD_LIGHT_GRID[1])
+    if world is not None and node_of(world) is not None:
+        _point(world, DISKS.at_path(world, path), physics.WORLD_LIGHT_GRID[1])
 
 
 def _point(world: bpy.types.World, image: bpy.types.Image, rows: int) -> None:
     node = node_of(world)
-    if node is None:
-        return
-    for each in map_nodes(node.node_tree):
-        if each.image != image:
-            each.image = image
-        if image.source == "SEQUENCE":
-            for name, value in SEQUENCE_SETTINGS.items():
-                if getattr(each.image_user, name) != value:
-                    setattr(each.image_user, name, value)
+    world_images.read(map_nodes(node.node_tree), image)
     if node.inputs[world_disk.ROWS.name].default_value != rows:
         node.inputs[world_disk.ROWS.name].default_value = rows
-
-
-def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
-    """Return an image that a World remembers; not one that it shares with the World it is a copy of."""
-    image = world.get(key)
-    shared = any(each != world and each.get(key) == image for each in bpy.data.worlds)
-    return None if shared else image
 
 
 # --- the preview's layer --------------------------------------------------------------------------
@@ -187,42 +149,21 @@ def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
 def show_live(scene: bpy.types.Scene, layer: physics.LightLayer, in_turns: bool) -> None:
     """Let the World read a layer that is in memory; through the same image, or through two in turn."""
     world = lensed_world.lensed_world(scene)
-    if world is None or node_of(world) is None:
-        return
-    first, second = LIVE_IMAGES
-    shown = _shown_live(world)
-    key = second if in_turns and shown is not None and shown == world.get(first) else first
-    rows, columns = layer.transmittance.shape
-    image = _own(world, key)
-    if image is None or tuple(image.size) != (columns, rows):
-        image = bpy.data.images.new(LIVE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
-        image.alpha_mode = "CHANNEL_PACKED"
-        image.use_half_precision = False
-        world[key] = image
-    pixels = np.stack(disk_sync.planes_of(layer), axis=-1)[::-1]
-    image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
-    image.update()
-    _point(world, image, rows)
+    if world is not None and node_of(world) is not None:
+        pixels = pixels_of(*disk_sync.planes_of(layer))
+        image = DISKS.write_live(world, _shown_live(world), pixels, in_turns=in_turns)
+        _point(world, image, len(pixels))
 
 
 def _shown_live(world: bpy.types.World) -> bpy.types.Image | None:
     """Return the image of the preview's layer that the World reads now."""
     node = node_of(world)
-    read = set() if node is None else {each.image for each in map_nodes(node.node_tree)}
-    image = read.pop() if len(read) == 1 else None
-    return image if image is not None and image in [world.get(key) for key in LIVE_IMAGES] else None
+    return None if node is None else DISKS.shown_live(world, map_nodes(node.node_tree))
 
 
 def drop_live(scene: bpy.types.Scene) -> None:
     """Let the World read its files again, and free the preview's layer."""
     world = lensed_world.lensed_world(scene)
-    if world is None:
-        return
-    point_at_files(scene)
-    images = [world[key] for key in LIVE_IMAGES if world.get(key) is not None]
-    for key in LIVE_IMAGES:
-        if key in world:
-            del world[key]
-    for image in images:
-        if image.users == 0:
-            bpy.data.images.remove(image)
+    if world is not None:
+        point_at_files(scene)
+        DISKS.drop_live(world)

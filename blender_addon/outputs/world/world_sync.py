@@ -13,10 +13,9 @@ from ...core.physics_api import physics
 from ...nodes.world_nodes import map_nodes
 from ...scene import frame_setup
 from ..shared.look import look_of_group, write_to_group
-from ..shared.map_images import NO_MAP, SEQUENCE_SETTINGS, keep_as_data, map_image
-from . import lensed_world
-
-FILE_IMAGE_NAME, LIVE_IMAGE_NAME = "Umbra World Map", "Umbra Live Map"
+from ..shared.map_images import NO_MAP
+from . import lensed_world, world_images
+from .world_images import MAPS
 
 
 def refresh(scene: bpy.types.Scene) -> None:
@@ -67,46 +66,20 @@ def _group(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
 
 def _point(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
     group = _group(scene)
-    if group is None:
-        return
-    for node in map_nodes(group):
-        if node.image != image:
-            node.image = image
-        if image.source == "SEQUENCE":
-            for name, value in SEQUENCE_SETTINGS.items():
-                if getattr(node.image_user, name) != value:
-                    setattr(node.image_user, name, value)
-
-
-def _own(world: bpy.types.World, key: str) -> bpy.types.Image | None:
-    """An image that a World remembers; not one that it shares with the World it is a copy of."""
-    image = world.get(key)
-    shared = any(each != world and each.get(key) == image for each in bpy.data.worlds)
-    return None if shared else image
+    if group is not None:
+        world_images.read(map_nodes(group), image)
 
 
 def _file_image(scene: bpy.types.Scene) -> bpy.types.Image | None:
     """The image that reads the scene's maps: the one in use, or another; None without a lensed World."""
     world = lensed_world.lensed_world(scene)
-    if world is None:
-        return None
-    present = _own(world, lensed_world.FILE_IMAGE)
-    if present is None:
-        present = map_image(FILE_IMAGE_NAME)
-        world[lensed_world.FILE_IMAGE] = present
-    return present
+    return None if world is None else MAPS.file_image(world)
 
 
 def _point_at_path(scene: bpy.types.Scene, path: str) -> None:
-    image = _file_image(scene)
-    if image is None:
-        return
-    keep_as_data(image)
-    if image.source != "SEQUENCE":
-        image.source = "SEQUENCE"
-    if image.filepath != path:
-        image.filepath = path
-    _point(scene, image)
+    world = lensed_world.lensed_world(scene)
+    if world is not None:
+        _point(scene, MAPS.at_path(world, path))
 
 
 def point_at_files(scene: bpy.types.Scene) -> None:
@@ -139,20 +112,11 @@ def shows_live(scene: bpy.types.Scene) -> bool:
     return _shown_live(scene) is not None
 
 
-def live_images(world: bpy.types.World) -> list[bpy.types.Image]:
-    """The images that the preview's map is kept in."""
-    return [world[key] for key in lensed_world.LIVE_IMAGES if world.get(key) is not None]
-
-
 def _shown_live(scene: bpy.types.Scene) -> bpy.types.Image | None:
     """The image of the preview's map that the World reads now."""
     world = lensed_world.lensed_world(scene)
     group = lensed_world.group_of(world)
-    if world is None or group is None:
-        return None
-    read = {each.image for each in map_nodes(group)}
-    image = read.pop() if len(read) == 1 else None
-    return image if image in live_images(world) else None
+    return None if world is None or group is None else MAPS.shown_live(world, map_nodes(group))
 
 
 def show_live(scene: bpy.types.Scene, made: "physics.WorldMap") -> None:
@@ -162,27 +126,12 @@ def show_live(scene: bpy.types.Scene, made: "physics.WorldMap") -> None:
     if world is None or tree is None:
         return
     shown = _shown_live(scene)
-    key = _next_key(scene, world, shown)
-    image = _own(world, key)
-    rows, columns = made.texture.shape[:2]
-    if image is None or tuple(image.size) != (columns, rows):
-        image = bpy.data.images.new(LIVE_IMAGE_NAME, columns, rows, alpha=True, float_buffer=True, is_data=True)
-        image.alpha_mode = "CHANNEL_PACKED"
-        image.use_half_precision = False
-        world[key] = image
-    image.pixels.foreach_set(np.ravel(made.texture))
-    image.update()
+    image = MAPS.write_live(world, shown, made.texture, in_turns=needs_turns(scene))
     if shown is None or tree.users > 1:
         _point(scene, image)
     elif shown != image:  # looking after the group, too, would take longer than the map
         for node in map_nodes(tree):
             node.image = image
-
-
-def _next_key(scene: bpy.types.Scene, world: bpy.types.World, shown: bpy.types.Image | None) -> str:
-    """Under which key the next map goes: Cycles keeps the pixels of an image for as long as a shader reads it."""
-    first, second = lensed_world.LIVE_IMAGES
-    return second if needs_turns(scene) and shown is not None and shown == world.get(first) else first
 
 
 def needs_turns(scene: bpy.types.Scene) -> bool:
@@ -207,10 +156,4 @@ def drop_live(scene: bpy.types.Scene) -> None:
     if world is None:
         return
     point_at_files(scene)
-    images = live_images(world)
-    for key in lensed_world.LIVE_IMAGES:
-        if key in world:
-            del world[key]
-    for image in images:
-        if image.users == 0:
-            bpy.data.images.remove(image)
+    MAPS.drop_live(world)
