@@ -6,7 +6,7 @@ from __future__ import annotations
 from ..core.blender_version import COMPOSITOR_SETTINGS_ARE_SOCKETS
 from .arithmetic import clamp, combine, floor, maximum, mix, multiply_add
 from .builder import Float, Number, Vector
-from .image_nodes import image_size, map_uv, separate_color
+from .image_nodes import image_size, map_uv
 
 
 def sample_bilinearly(picture: Vector, u: Number, v: Float) -> Vector:
@@ -51,13 +51,3 @@ def sample_bilinearly(picture: Vector, u: Number, v: Float) -> Vector:
         texels = [map_uv(picture, combine(column_at, row_at, 1.0), "Nearest") for column_at in columns]
         mixed.append(mix(share_x, *texels))
     return mix(share_y, *mixed)
-
-
-def sample_with_alpha(picture: Vector, u: Float, v: Float) -> tuple[Vector, Float]:
-    """Color and alpha of a picture at texture coordinates, as `sample_bilinearly`."""
-    if COMPOSITOR_SETTINGS_ARE_SOCKETS:
-        color = sample_bilinearly(picture, u, v)
-        return color, separate_color(color)[3]
-    _, _, _, alpha = separate_color(picture)
-    alphas = sample_bilinearly(combine(alpha, alpha, alpha), u, v)
-    return sample_bilinearly(picture, u, v), alphas.separate()[0]

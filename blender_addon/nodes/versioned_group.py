@@ -44,15 +44,13 @@ class SocketSpec:
 
 def setting_socket(setting: physics.Setting) -> SocketSpec:
     """Return the input of a row of the table `physics.SKY_SETTINGS`."""
-    low, high = setting.limits
-    choices = ", ".join(f"{each.socket_value:g} is {each.label}" for each in setting.choices)
     return SocketSpec(
         setting.socket,
         "NodeSocketFloat",
-        f"{setting.sentence}: {choices}" if choices else setting.sentence,
-        default=setting.socket_value(setting.default),
-        minimum=low,
-        maximum=high,
+        setting.sentence,
+        default=float(setting.default),
+        minimum=setting.low,
+        maximum=setting.high,
         subtype=setting.subtype,
     )
 

@@ -15,7 +15,7 @@ from . import disk_layer
 from .arithmetic import floor, maximum, minimum, mix, multiply_add
 from .builder import Float, TreeBuilder, Vector
 from .versioned_group import SocketSpec, Values, VersionedGroup
-from .world_nodes import MAP_ROLE
+from .world_nodes import texel
 
 LEAST_COVER = 1e-4
 """Where the disk hides less than this, its light is that much too dim."""
@@ -52,7 +52,7 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
         lights: list[Vector] = []
         shares: list[Float] = []
         for y in places_y:
-            texels = [_texel(builder, x, y) for x in places_x]
+            texels = [texel(builder, x, y) for x in places_x]
             lights.append(mix(share_x, *(light for light, _ in texels)))
             shares.append(mix(share_x, *(share for _, share in texels)))
         light, passes = mix(share_y, *lights), mix(share_y, *shares)
@@ -61,16 +61,6 @@ def _build(builder: TreeBuilder, values: Values) -> Values:
         color = light * tint * (2.0**exposure / maximum(LEAST_COVER, hides))
         covers = hides * opacity * bent
     return {COLOR.name: color, COVERS.name: covers}
-
-
-def _texel(builder: TreeBuilder, across: Float, height: Float) -> tuple[Vector, Float]:
-    node = builder.node("ShaderNodeTexImage")
-    node.interpolation = "Closest"
-    node.projection = "FLAT"
-    node.extension = "REPEAT"
-    node[MAP_ROLE] = True
-    builder.feed(node.inputs["Vector"], builder.combine(across, height, 0.0))
-    return Vector(builder, node.outputs["Color"]), Float(builder, node.outputs["Alpha"])
 
 
 _GROUP = VersionedGroup(

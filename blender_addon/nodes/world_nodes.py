@@ -101,11 +101,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
     with builder.frame("Aberration (Eq. 5)"):
         seen = _seen_by_fido(looking, header)
     with builder.frame("Angles about the hole"):
-        aside = seen.dot(header.polar)
-        up = seen.dot(header.outward.cross(header.polar))
-        ahead = -seen.dot(header.outward)
-        away = atan2(sqrt(multiply_add(aside, aside, up * up)), ahead).labeled("From the hole")
-        across = atan2(up, aside) * (0.5 / math.pi)
+        away, across = _about_hole(seen, header)
         column = multiply_add(across, header.width, -0.5)
         left = floor(column)
         share_x = column - left
@@ -113,7 +109,7 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
     with builder.frame("Place in a panorama about the hole"):
         place = _place(looking, header, lensed)
     with builder.frame("The shadow's edge"):
-        edges = [_texel(builder, each, 0.5)[1] for each in columns]
+        edges = [texel(builder, each, 0.5)[1] for each in columns]
         delta = (away - mix(share_x, *edges)).labeled("From the edge")
         visible = delta.greater_than(0.0).labeled("Sky?")
     with builder.frame("Where the light comes from"):
@@ -137,16 +133,24 @@ def build(builder: TreeBuilder, inputs: WorldInputs) -> WorldOutputs:
     return WorldOutputs(vector, shift, light, shadow, redshift, place)
 
 
+def _about_hole(direction: Vector, header: _Header) -> tuple[Float, Float]:
+    """Angle of a direction from that of the hole, radians, and its position angle about that, in turns."""
+    aside = direction.dot(header.polar)
+    up = direction.dot(header.outward.cross(header.polar))
+    ahead = -direction.dot(header.outward)
+    away = atan2(sqrt(multiply_add(aside, aside, up * up)), ahead).labeled("From the hole")
+    return away, atan2(up, aside) * (0.5 / math.pi)
+
+
 def _place(looking: Vector, header: _Header, lensed: Float) -> Vector:
     """Where `physics.HolePanorama` sees a direction: turns about the hole's direction, from above down; and if bent."""
-    aside, up = looking.dot(header.polar), looking.dot(header.outward.cross(header.polar))
-    away = atan2(sqrt(multiply_add(aside, aside, up * up)), -looking.dot(header.outward))
+    away, across = _about_hole(looking, header)
     focus, rate = physics.HolePanorama.FOCUS, physics.HolePanorama.RATE
     down = log(multiply_add(away, 1.0 / focus, 1.0)) * (1.0 / rate)
-    return combine(atan2(up, aside) * (0.5 / math.pi), down, lensed)
+    return combine(across, down, lensed)
 
 
-def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector, Float]:
+def texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector, Float]:
     """Color and alpha of the texel at texture coordinates; `across` repeats with period 1."""
     place = builder.combine(across, height, 0.0)
     node = builder.node("ShaderNodeTexImage")
@@ -160,7 +164,7 @@ def _texel(builder: TreeBuilder, across: Number, height: Number) -> tuple[Vector
 
 def _read_header(builder: TreeBuilder) -> _Header:
     (outward, offset), (polar, slope), (motion, beta), (shift, constant), (last, height) = (
-        _texel(builder, (part + 0.5) / physics.WORLD_MAP_HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
+        texel(builder, (part + 0.5) / physics.WORLD_MAP_HEADER_PARTS, _HEADER_HEIGHT) for part in range(5)
     )
     lowest, stamp, width = last.separate()
     width, height = maximum(1.0, width), maximum(1.0, height)
@@ -188,6 +192,6 @@ def _origin(builder: TreeBuilder, header: _Header, columns: list[Float], share_x
     mixed = []
     for shift in (0.5, 1.5):
         at = minimum(last, below + shift) / header.height
-        texels = [_texel(builder, column, at)[0] for column in columns]
+        texels = [texel(builder, column, at)[0] for column in columns]
         mixed.append(mix(share_x, *texels))
     return mix(share_y, *mixed)
