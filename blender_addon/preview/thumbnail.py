@@ -111,9 +111,9 @@ def steps(
     scene = scene_of(uid)
     if scene is None:
         return None
-    picture = physics.render_reference(warp_map, _sky_of(scene), **look(scene)).sky
+    picture: Array = physics.render_reference(warp_map, _sky_of(scene), **look(scene)).sky
     if layer is not None:
-        _lay_over(scene, layer, picture)
+        picture = _laid_over(scene, layer, picture)
     picture[..., :3] = _encoded(picture[..., :3])
     return picture[::-1]
 
@@ -137,12 +137,12 @@ def _live(scene: bpy.types.Scene) -> tuple[float, ...]:
     return (0.0, 1.0, 1.0, 1.0, 1.0) if disk is None else (disk.exposure, disk.opacity, *disk.tint)
 
 
-def _lay_over(scene: bpy.types.Scene, layer: "physics.LightLayer", picture: Array) -> None:
-    """Lay a disk over a picture, in place, as the compositor does."""
+def _laid_over(scene: bpy.types.Scene, layer: "physics.LightLayer", picture: Array) -> Array:
+    """Return a disk over a picture, as the compositor lays it."""
     exposure, opacity, *tint = _live(scene)
-    left = 1.0 - (1.0 - layer.transmittance) * opacity
-    picture[..., :3] *= left[..., None]
-    picture[..., :3] += layer.light * (np.array(tint) * (2.0**exposure * opacity))
+    light = layer.light * (np.array(tint) * (2.0**exposure * opacity))
+    over: Array = physics.disk_over_sky(picture, light, 1.0 - (1.0 - layer.transmittance) * opacity)
+    return over
 
 
 def _encoded(values: Array) -> Array:
@@ -213,6 +213,6 @@ def _shrunk(image: bpy.types.Image) -> Array:
     small = values[: rows * step, : columns * step].reshape(rows, step, columns, step, -1).mean(axis=(1, 3))
     small = small[..., :3] if image.channels >= 3 else np.repeat(small[..., :1], 3, axis=-1)
     if not image.is_float and color_spaces.is_srgb(image):
-        small = np.where(small <= 0.04045, small / 12.92, ((small + 0.055) / 1.055) ** 2.4)
+        small = physics.linear_from_srgb(small)
     shrunk: Array = small.astype(np.float64)
     return shrunk

@@ -65,8 +65,6 @@ def _pixels(image: bpy.types.Image) -> np.ndarray[tuple[int, ...], np.dtype[np.f
     pixels = pixels.copy()
     if not image.is_float:  # byte images have the file's values: not linear, not premultiplied
         if color_spaces.is_srgb(image):
-            color = pixels[..., :3]
-            linear = ((color + 0.055) / 1.055) ** 2.4
-            pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, linear)
+            pixels[..., :3] = physics.linear_from_srgb(pixels[..., :3])
         pixels[..., :3] *= pixels[..., 3:]
     return pixels

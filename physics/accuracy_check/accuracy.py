@@ -32,7 +32,7 @@ from ..numerics.blocks import BLOCK_SIZE
 from ..numerics.checks import shown
 from ..numerics.errors import BlackHoleError, WarpMapError
 from ..numerics.sphere import unit_vectors
-from ..numerics.work import Cancel, Progress, drain
+from ..numerics.work import Cancel, Progress, drain, share_of
 from ..sampling.view import View
 from ..sampling.visibility import cells_for_shadow, center_block, refine
 from ..shot.map_parameters import WarpMapParameters
@@ -166,21 +166,11 @@ def accuracy_steps(
     pixels.parameters.validate()
     disk = [_read_pass(each, path, pixels.hash) for each in passes]
     share = 0.25 if disk else 1.0 / 3.0
-    chosen = yield from _portion(choose(pixels.kind, pixels.kind == SKY, pixels.direction, samples, seed), 0.0, share)
-    visibility = yield from _portion(_visibility(pixels.parameters, chosen), share, share)
-    rays = yield from _portion(_trace(pixels, chosen), 2.0 * share, share)
-    judged = yield from _portion(_judge_passes(disk, pixels.parameters, chosen), 3.0 * share, share)
+    chosen = yield from share_of(choose(pixels.kind, pixels.kind == SKY, pixels.direction, samples, seed), 0.0, share)
+    visibility = yield from share_of(_visibility(pixels.parameters, chosen), share, 2.0 * share)
+    rays = yield from share_of(_trace(pixels, chosen), 2.0 * share, 3.0 * share)
+    judged = yield from share_of(_judge_passes(disk, pixels.parameters, chosen), 3.0 * share, 4.0 * share)
     return _report(path, pixels, chosen, visibility, rays, environment_width, judged)
-
-
-def _portion(steps: Generator[float, None, Any], start: float, share: float) -> Generator[float, None, Any]:
-    """Run a part of the work, whose fractions become `share` of the whole from `start` on."""
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as end:
-            return end.value
-        yield start + share * fraction
 
 
 # --- reading ----------------------------------------------------------------------------------------

@@ -110,7 +110,7 @@ def _read_by_image_io(path: PathLike) -> NDArray[np.float32]:
     return picture
 
 
-def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float64]:
+def linear_from_srgb(encoded: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """Return linear values of sRGB ones from 0 to 1 (IEC 61966-2-1).
 
     Parameters

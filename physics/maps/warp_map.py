@@ -10,7 +10,7 @@ from typing import Any
 from ..disk_passes.disk_painting import DiskPainting
 from ..disk_passes.disk_pass import DiskPass
 from ..numerics.arrays import Image
-from ..numerics.work import Cancel, Progress, drain
+from ..numerics.work import Cancel, Progress, drain, share_of
 from ..sampling.view import View
 from ..shot.map_parameters import WarpMapParameters
 from .painting import Painting
@@ -100,10 +100,8 @@ def bake_steps(parameters: WarpMapParameters) -> Generator[float, None, WarpMap]
     if parameters.disk is None:
         yield from painting.steps()
         return WarpMap(*painting.planes, {**metadata, "counts": painting.counts()})
-    for fraction in painting.steps():
-        yield 0.5 * fraction
+    yield from share_of(painting.steps(), 0.0, 0.5)
     disk = DiskPainting(parameters, view)
-    for fraction in disk.steps():
-        yield 0.5 + 0.5 * fraction
+    yield from share_of(disk.steps(), 0.5, 1.0)
     metadata["counts"] = {**painting.counts(), **disk.counts()}
     return WarpMap(*painting.planes, metadata, disk.passes(metadata))
