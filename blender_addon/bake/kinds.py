@@ -12,6 +12,7 @@ from ..core.session import SESSION, Life
 # What the maps of one bake or render have in common is kept here.
 _baker = SESSION.value(physics.MapBaker, Life.RENDER)
 _light_baker = SESSION.value(physics.LightBaker, Life.RENDER)
+_star_baker = SESSION.value(physics.StarBaker, Life.RENDER)
 
 
 def forget_shared_rays() -> None:
@@ -23,10 +24,6 @@ def forget_shared_rays() -> None:
 
 def _warp_map_steps(parameters: "physics.WarpMapParameters") -> "Generator[float, None, physics.WarpMap]":
     return (yield from _baker.now.steps(parameters))
-
-
-# Stars share their search between frames.
-_star_baker = SESSION.value(physics.StarBaker, Life.RENDER)
 
 
 def _star_layer_steps(parameters: "physics.StarParameters") -> "Generator[float, None, physics.StarLayer]":

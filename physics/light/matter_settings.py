@@ -54,9 +54,8 @@ class MatterLook:
             0,
             "Page-Thorne",
             "Physically accurate: dark at the innermost stable orbit, hottest outside of it",
-            1.0,
         ),
-        Choice("power_law", "power_law", 1, "Power Law", "Hottest at the inner edge, cooler outward", 0.0),
+        Choice("power_law", "power_law", 1, "Power Law", "Hottest at the inner edge, cooler outward"),
     )
     exponent: float = _number(3.0, "Falloff Power", "Power of the radius by which a Power Law's flux falls", 0.0, 20.0)
     temperature: float = _number(
@@ -74,9 +73,9 @@ class MatterLook:
     band: str = _choice(
         "Light",
         "Which light the brightness counts",
-        Choice(VISIBLE, "VISIBLE", 0, "Visible", "The light that an eye sees, as the sky's", 0.0),
-        Choice(BOLOMETRIC, "BOLOMETRIC", 1, "All Light", "The light of all wavelengths", 4.0),
-        Choice(MONOCHROMATIC, "MONOCHROMATIC", 2, "One Color", "The light of a narrow band", 3.0),
+        Choice(VISIBLE, "VISIBLE", 0, "Visible", "The light that an eye sees, as the sky's"),
+        Choice(BOLOMETRIC, "BOLOMETRIC", 1, "All Light", "The light of all wavelengths"),
+        Choice(MONOCHROMATIC, "MONOCHROMATIC", 2, "One Color", "The light of a narrow band"),
     )
     doppler_color: float = _amount(
         1.0, "Doppler Color", "How much motion and gravity change the color: 0 is not at all, 1 is physically accurate"

@@ -22,8 +22,6 @@ class Choice:
     """The item's number, which .blend files hold: it never changes."""
     label: str
     description: str
-    socket_value: float
-    """What the node groups' input takes for it."""
 
 
 @dataclass(frozen=True)
@@ -57,21 +55,6 @@ class Setting:
     def sentence(self) -> str:
         """The description with the unit, unless it names that itself."""
         return self.description if self.unit in self.description else f"{self.description} ({self.unit})"
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """The smallest and the largest value of the node groups' input."""
-        if not self.choices:
-            return self.low, self.high
-        values = [choice.socket_value for choice in self.choices]
-        return min(values), max(values)
-
-    def socket_value(self, value: float | str | int) -> float:
-        """Return what the node groups' input takes for a value."""
-        for choice in self.choices:
-            if choice.value == value:
-                return choice.socket_value
-        return float(value)
 
     def problem(self, value: Any) -> str | None:
         """Return what is wrong with a value, as the end of a sentence that begins with the setting's name.

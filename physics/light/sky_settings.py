@@ -73,9 +73,9 @@ SKY_FILTER = Setting(
     8,
     option="--filter",
     choices=(
-        Choice(0, "OFF", 0, "Off", "One look at the sky per pixel: beside the shadow it flickers", 0.0),
-        Choice(8, "FAST", 1, "Fast", "Eight looks per pixel, along the ellipse that it sees of the sky", 8.0),
-        Choice(16, "BEST", 2, "Best", "Sixteen looks per pixel: sharper beside the shadow", 16.0),
+        Choice(0, "OFF", 0, "Off", "One look at the sky per pixel: beside the shadow it flickers"),
+        Choice(8, "FAST", 1, "Fast", "Eight looks per pixel, along the ellipse that it sees of the sky"),
+        Choice(16, "BEST", 2, "Best", "Sixteen looks per pixel: sharper beside the shadow"),
     ),
 )
 """The values are numbers of looks; see `reference.filtered_sky`."""
@@ -86,9 +86,9 @@ GLARE = Setting(
     glare.OFF,
     option="--glare",
     choices=(
-        Choice(glare.OFF, "OFF", 0, "Off", "Light stays where it is", 0.0),
-        Choice(glare.SUBTLE, "SUBTLE", 1, "Subtle", "A clean lens: bright stars have a faint glow", 1.0),
-        Choice(glare.FILM, "FILM", 2, "Film", "An old lens: a wide glow, and spikes to four sides", 2.0),
+        Choice(glare.OFF, "OFF", 0, "Off", "Light stays where it is"),
+        Choice(glare.SUBTLE, "SUBTLE", 1, "Subtle", "A clean lens: bright stars have a faint glow"),
+        Choice(glare.FILM, "FILM", 2, "Film", "An old lens: a wide glow, and spikes to four sides"),
     ),
 )
 """The values are kinds of `glare.GLARES`."""

@@ -31,7 +31,7 @@ NODES, COARSE_NODES = 12, 20
 KEPT = 0.35
 """Share of the nodes that is spread evenly over a pass; the others go where light comes from."""
 
-PROFILE_HEIGHT, PROFILE_POWER, PROFILE_AREA = 1.2, 6, 2.0 * 1.2 * 0.9277
+PROFILE_HEIGHT, PROFILE_AREA = 1.2, 2.0 * 1.2 * 0.9277
 HIGHEST = 2.6
 """Of the layer, in units of H."""
 

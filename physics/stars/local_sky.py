@@ -20,7 +20,7 @@ from ..kerr.critical_curve import around_hole, edge_angles
 from ..kerr.observer import Observer
 from ..kerr.rays import rays_from_triad
 from ..maps.world_map import distances
-from ..numerics.arrays import Array, Index, Mask
+from ..numerics.arrays import Array, Mask
 from ..numerics.blocks import blocks
 from ..numerics.interpolation import lagrange_weights
 from ..numerics.sphere import cos_sin
@@ -198,10 +198,3 @@ def _trace(spin: float, fido: Observer, looking: Array) -> tuple[Array, Mask]:
         fate, directions[block] = trace_block(rays, TOLERANCE, "gauss-legendre")
         known[block] = fate == Fate.SKY
     return directions, known
-
-
-def cell_of(sky: LocalSky, x: Array, y: Array) -> tuple[Index, Index]:
-    """Return the columns and rows of the cells that hold places of the table, shape (n,) each."""
-    column = np.clip(np.floor(x), 0, len(sky.edge) - 1).astype(np.intp)
-    row = np.clip(np.floor(y), 0, sky.rows - 2).astype(np.intp)
-    return column, row

@@ -34,8 +34,8 @@ def check_property(owner: bpy.types.PropertyGroup, name: str, row: object) -> No
 
 
 def check_socket(item: bpy.types.NodeTreeInterfaceSocket, row: object) -> None:
-    assert (item.min_value, item.max_value) == pytest.approx(row.limits)
-    assert item.default_value == pytest.approx(row.socket_value(row.default))
+    assert (item.min_value, item.max_value) == pytest.approx((row.low, row.high))
+    assert item.default_value == pytest.approx(row.default)
     assert item.description.startswith(row.sentence)
 
 

@@ -143,11 +143,11 @@ class LensOutput(Output):
     def point_at(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, frame: FrameSetup) -> list[str]:
         """Give the camera the frame's parameters and its map."""
         world_files.check(scene)
+        warnings = lens_objects.warnings(scene, depsgraph, frame)
         if lens_disk.is_in_use(scene):
             lens_disk.point_at_layers(scene)
-        warnings = lens_objects.warnings(scene, depsgraph, frame)
-        light = lens_disk.request_of(scene, frame) if lens_disk.is_in_use(scene) else None
-        warnings += [] if light is None else disk_sync.unresolved(light)
+            light = lens_disk.request_of(scene, frame)
+            warnings += [] if light is None else disk_sync.unresolved(light)
         if scene.umbra.foreground_scene is not None:
             camera = cameras.active_camera(scene).evaluated_get(depsgraph)
             foreground.copy_lens(scene.umbra.foreground_scene, camera.data)
